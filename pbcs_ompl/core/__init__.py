@@ -1,0 +1,1 @@
+"""The vocabulary of the toolkit: contracts, errors, registry, seeds, result folders."""

@@ -1,0 +1,175 @@
+"""What the rooms of the toolkit promise each other.
+
+Axes: B batch, N nodes, T time, D state, A action, O observation, F feature. All arrays are float64 unless said
+otherwise; states are complete: everything that is needed to restart the simulator.
+"""
+
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IndexArray = NDArray[np.int64]
+Capability = Literal["visited", "arbitrary", "exact"]
+
+
+class Transition(NamedTuple):
+    """The outcome of one step of a batch of states."""
+
+    states: Array
+    """Next states [B, D]."""
+    rewards: Array
+    """Rewards [B]."""
+    terminated: BoolArray
+    """Whether the episode ends in the next state [B]. Planners never expand such a state."""
+    success: BoolArray
+    """Whether the next state reaches the environment's goal [B]."""
+
+
+class ResetAnywhere(Protocol):
+    """An environment seen as functions of states: what planners and skills work on.
+
+    One adapter for each family of environments lies in `pbcs_ompl.reset_anywhere`.
+
+    Attributes:
+        env_id, env_kwargs: What `gymnasium.make` needs to build the same environment again.
+        capabilities: "visited" states can be restored; "arbitrary" vectors within the bounds too; "exact" means
+            that a restored state continues bit for bit.
+        state_low, state_high: Bounds of the state [D], finite.
+        action_low, action_high: Bounds of the action [A], finite.
+        feature_low, feature_high: Bounds of the explored feature [F], finite.
+        feature_dims: The state dimensions that are the feature, when it is a selection of them, else None.
+        bin_size: Suggested edge length of exploration bins along each feature dimension [F].
+        goal_threshold: A state is a success if and only if `goal_distance < goal_threshold`.
+        max_episode_steps: Suggested length of an episode.
+        walls: Rectangles [W, 4] (x0, y0, x1, y1) in the first two feature dimensions, for pictures; may be empty.
+        goal_circle: Centre and radius (x, y, r) of the goal in the same plane, for pictures; None when unknown.
+    """
+
+    env_id: str
+    env_kwargs: dict[str, Any]
+    capabilities: frozenset[Capability]
+    state_low: Array
+    state_high: Array
+    action_low: Array
+    action_high: Array
+    feature_low: Array
+    feature_high: Array
+    feature_dims: tuple[int, ...] | None
+    bin_size: Array
+    observation_size: int
+    goal_threshold: float
+    max_episode_steps: int
+    walls: Array
+    goal_circle: tuple[float, float, float] | None
+
+    def initial_state(self, seed: int | None = None) -> Array:
+        """Return the state [D] after `env.reset(seed=seed)`."""
+        ...
+
+    def transition(self, states: Array, controls: Array) -> Transition:
+        """Advance states [B, D] by one step under controls [B, A]; fresh arrays are returned."""
+        ...
+
+    def step_one(self, state: list[float], control: list[float]) -> list[float]:
+        """Advance one state, given and returned as a list of D floats: the fast path of a single propagation."""
+        ...
+
+    def observe(self, states: Array) -> Array:
+        """Return the observations [B, O] a policy sees in states [B, D]."""
+        ...
+
+    def feature(self, states: Array) -> Array:
+        """Return the features [B, F] of states [B, D]."""
+        ...
+
+    def goal_distance(self, states: Array) -> Array:
+        """Return the distances [B] from states [B, D] to the environment's goal."""
+        ...
+
+    def is_valid(self, states: Array) -> BoolArray:
+        """Return which states [B, D] the environment can be in (FCL decides where there are walls)."""
+        ...
+
+    def distance(self, states: Array, others: Array) -> Array:
+        """Return the distances [B] between states [B, D] and others [B, D] or [D], as activation sets use them."""
+        ...
+
+    def perturb(self, state: Array, radius: float, count: int, rng: np.random.Generator, *,
+                reject_invalid: bool = True) -> Array:
+        """Draw `count` states [count, D] within `radius` of `state` [D]; invalid ones are drawn again.
+
+        Raises:
+            InvalidState: no valid state was found near `state`.
+        """
+        ...
+
+    def advance_towards(self, states: Array, targets: Array) -> Array:
+        """Return controls [B, A] that lead from states [B, D] towards targets [B, F].
+
+        Raises:
+            InvalidOption: the environment offers no steering.
+        """
+        ...
+
+
+@runtime_checkable
+class VectorisedEnv(Protocol):
+    """What an environment offers to be reset anywhere in the fastest way (beside being a `gymnasium.Env`).
+
+    Optional attributes, each with a default: `feature_dims` (all), `bin_size` (extent / 20), `advance_towards`
+    (none), `step_one` (through `transition`), `walls` (none), `goal_circle` (none).
+    """
+
+    state_low: Array
+    state_high: Array
+    goal_threshold: float
+
+    def get_env_state(self) -> Array: ...
+    def set_env_state(self, state: Array) -> None: ...
+    def transition(self, states: Array, controls: Array) -> Transition: ...
+    def observe(self, states: Array) -> Array: ...
+    def goal_distance(self, states: Array) -> Array: ...
+    def is_valid(self, states: Array) -> BoolArray: ...
+
+
+class Counter:
+    """Counts transitions against a budget, in one place for all planners.
+
+    Args:
+        budget: The most transitions that may be made; None for no bound.
+    """
+
+    def __init__(self, budget: int | None = None):
+        self.count = 0
+        self.budget = budget
+
+    @property
+    def left(self) -> int:
+        """Transitions that may still be made."""
+        return 2**62 if self.budget is None else max(0, self.budget - self.count)
+
+
+@runtime_checkable
+class BatchPlanner(Protocol):
+    """A planner that can propagate many states together when the environment allows it."""
+
+    def use_model(self, model: ResetAnywhere, counter: Counter) -> None:
+        """Propagate through `model` from now on, and count every transition in `counter`."""
+        ...
+
+
+@runtime_checkable
+class PlannerFactory(Protocol):
+    """A registry entry that is not itself an `ompl.base.Planner` class: it builds one."""
+
+    def build(self, si: Any, *, seed: int, **options: Any) -> Any:
+        """Return a new planner for the space information `si`."""
+        ...
+
+
+ProgressCallback = Callable[[dict[str, Any]], None]
+"""Called now and then with plain numbers; must be quick and must not raise."""

@@ -1,0 +1,186 @@
+"""A result folder: never overwritten silently, never half-written, used by one process at a time."""
+
+import errno
+import fcntl
+import json
+import os
+import tempfile
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from pbcs_ompl.core.errors import DamagedFile, RunFolderError
+
+CONFIG = "config.toml"
+RESULT = "result.json"
+
+
+class RunFolder:
+    """A folder that one run writes, locked while it does.
+
+    Args:
+        path: The folder; it is created.
+        resume: Continue in a folder that already holds a run instead of refusing it.
+
+    Raises:
+        RunFolderError: the folder holds something, is in use, or cannot be written.
+    """
+
+    def __init__(self, path: str | Path, *, resume: bool = False):
+        self.path = Path(path)
+        if resume and not (self.path / CONFIG).is_file():
+            raise RunFolderError(f"nothing to resume: {self.path / CONFIG} does not exist")
+        if not resume and self.path.is_dir() and any(p.name != ".lock" for p in self.path.iterdir()):
+            raise RunFolderError(f"{self.path} already exists; choose another --out, or remove it first")
+        with clear_write_errors(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._lock = open(self.path / ".lock", "w")  # noqa: SIM115 - held for the life of the run
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            self._lock.close()
+            raise RunFolderError(f"{self.path} is in use by another process; choose another --out") from error
+
+    def __enter__(self) -> "RunFolder":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the lock and remove its file."""
+        if not self._lock.closed:
+            (self.path / ".lock").unlink(missing_ok=True)
+            self._lock.close()
+
+    def write_config(self, config: dict[str, Any]) -> None:
+        """Write the settings that repeat this run."""
+        write_text(self.path / CONFIG, to_toml(config))
+
+    def write_result(self, result: dict[str, Any]) -> None:
+        """Write the answer as JSON."""
+        write_json(self.path / RESULT, result)
+
+
+@contextmanager
+def clear_write_errors(path: Path) -> Iterator[None]:
+    """Turn an OSError while writing below `path` into one clear line."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno == errno.ENOSPC:
+            raise RunFolderError(f"the disk is full: could not write {path}; free some space and resume") from error
+        raise RunFolderError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def write_atomically(path: Path, write: Callable[[IO[bytes]], None]) -> None:
+    """Write a file under a temporary name, flush it to disk, then rename it: it is whole or absent."""
+    with clear_write_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                write(file)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file atomically."""
+    write_atomically(path, lambda file: file.write(text.encode()) and None)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write JSON atomically; NumPy numbers and arrays become plain ones."""
+    write_text(path, json.dumps(value, indent=2, default=plain) + "\n")
+
+
+def write_arrays(path: Path, **arrays: np.ndarray) -> None:
+    """Write arrays as one compressed npz, atomically."""
+    write_atomically(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
+
+
+def read_json(path: Path) -> Any:
+    """Read JSON.
+
+    Raises:
+        DamagedFile: the file is missing, truncated or not JSON.
+    """
+    try:
+        return json.loads(Path(path).read_text())
+    except FileNotFoundError as error:
+        raise DamagedFile(f"{path} does not exist") from error
+    except (OSError, ValueError) as error:
+        raise DamagedFile(f"{path} is damaged: {error}") from error
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read TOML.
+
+    Raises:
+        DamagedFile: the file is missing or does not parse.
+    """
+    try:
+        return tomllib.loads(Path(path).read_text())
+    except FileNotFoundError as error:
+        raise DamagedFile(f"{path} does not exist") from error
+    except (OSError, ValueError) as error:
+        raise DamagedFile(f"{path} is damaged: {error}") from error
+
+
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Read all arrays of an npz, without pickle.
+
+    Raises:
+        DamagedFile: the file is missing or truncated.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except FileNotFoundError as error:
+        raise DamagedFile(f"{path} does not exist") from error
+    except Exception as error:  # zipfile, zlib, ValueError, EOFError: all mean the same to the user
+        raise DamagedFile(f"{path} is damaged: {error}") from error
+
+
+def plain(value: Any) -> Any:
+    """Turn NumPy values and paths into what JSON knows."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, frozenset | set):
+        return sorted(value)
+    raise TypeError(f"cannot write {type(value).__name__} as JSON")
+
+
+def to_toml(config: dict[str, Any]) -> str:
+    """Write a flat table, with sub-tables one level deep, as TOML. Values that are None are left out."""
+    flat = {key: value for key, value in config.items() if not isinstance(value, dict)}
+    tables = {key: value for key, value in config.items() if isinstance(value, dict)}
+    lines = [f"{key} = {_toml_value(value)}" for key, value in flat.items() if value is not None]
+    for name, table in tables.items():
+        lines += ["", f"[{name}]"]
+        lines += [f"{json.dumps(key)} = {_toml_value(value)}" for key, value in table.items() if value is not None]
+    return "\n".join(lines) + "\n"
+
+
+def _toml_value(value: Any) -> str:
+    value = plain(value) if isinstance(value, np.ndarray | np.generic | Path) else value
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(k)} = {_toml_value(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
+    if isinstance(value, float) and not np.isfinite(value):
+        return "nan" if np.isnan(value) else ("inf" if value > 0 else "-inf")
+    return json.dumps(value)
