@@ -1,0 +1,46 @@
+# Two commands: `make demo` and `make test`. Both need Python 3.11 or newer and make, nothing else.
+# PYTHON=... picks another interpreter, PIP_ARGS=... is handed to pip (another index, an offline folder of wheels).
+
+PYTHON ?= python3
+PIP_ARGS ?=
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+WORKERS ?= 2
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test check bench clean
+
+help:
+	@echo "make demo    install, train a skill chain on a 5x5 maze, show the result"
+	@echo "make test    install, run the tests, show the maze solve rates"
+	@echo "make check   lint, types, direction of imports"
+	@echo "make bench   measure what the README's table states (takes long)"
+	@echo "make setup   only prepare $(VENV)"
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "make: $(PYTHON) is too old: Python 3.11 or newer is needed (make PYTHON=python3.12 ...)" >&2; exit 2; }
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet $(PIP_ARGS) -c constraints.txt -e '.[all,dev]'
+	@touch $@
+
+demo: setup
+	@rm -rf runs/demo
+	$(BIN)/pbcs train --env pbcs/Maze-v0 --env-kwargs '{"size": 5, "maze_seed": 1}' --seed 0 --out runs/demo
+
+test: setup
+	$(BIN)/python -m pytest -n $(WORKERS)
+
+check: setup
+	$(BIN)/ruff check
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+
+bench: setup
+	@for script in tests/benchmarks/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+clean:
+	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,0 +1,107 @@
+"""The box and the off-centre disc of [Matheron2020] 3.1, Figs 3.2-3.4: `pbcs/Box-v0` and `pbcs/Disc-v0`."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from envs import box_disc_kernels as kernels
+from envs.point_env import PointEnv
+from envs.rendering import rasterise
+from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.errors import InvalidOption
+
+EXTENT = 5.0
+
+
+class BoxEnv(PointEnv):
+    """S = [0, 5]^2; a step that would leave S does not move.
+
+    Args:
+        start: Start position, by default the centre.
+        goal: Centre of a goal of radius 0.2, or None (default): nothing is rewarded and no episode ends.
+        terminate_on_success, normalize_actions, render_mode: As in `PointEnv`.
+
+    Raises:
+        InvalidState: a start or goal outside of S.
+    """
+
+    where_invalid = "outside of the box"
+
+    def __init__(self, *, start: Sequence[float] = (2.5, 2.5), goal: Sequence[float] | None = None,
+                 terminate_on_success: bool = True, normalize_actions: bool = False,
+                 render_mode: str | None = None):
+        super().__init__(EXTENT, start, goal, terminate_on_success=terminate_on_success,
+                         normalize_actions=normalize_actions, render_mode=render_mode)
+
+    def move(self, states: Array, controls: Array) -> tuple[Array, BoolArray]:
+        """Return the next states [B, 2] and whether the border was hit [B]."""
+        return kernels.move_in_box(self.settings, EXTENT, states, controls)
+
+    def step_one(self, state: list[float], control: list[float]) -> list[float]:
+        """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
+        x, y = state
+        a, b = control
+        return [*kernels.step_one_in_box(self.settings, EXTENT, x, y, a, b)]
+
+    def is_valid(self, states: Array) -> BoolArray:
+        """Return which states [B, 2] lie in S [B]."""
+        return self.in_bounds(states)
+
+
+class DiscEnv(PointEnv):
+    """The box of which only an off-centre disc can be reached; S stays what planners sample.
+
+    A step that would leave the disc does not move, but for a small perturbation that makes repeated attempts
+    visible as dense spots (footnote 2). Differs: the perturbation is a hash of (s, a) instead of a random number,
+    so that the environment is deterministic and paths replay; and it never leads out of the disc.
+
+    Args:
+        centre: Centre of the disc; the figures of the thesis give no numbers.
+        radius: Radius of the disc.
+        perturbation: Each coordinate of a refused step changes by up to this much; 0 for none.
+        start: Start position, by default the centre of the disc.
+        goal: Centre of a goal of radius 0.2, or None (default): nothing is rewarded and no episode ends.
+        terminate_on_success, normalize_actions, render_mode: As in `PointEnv`.
+
+    Raises:
+        InvalidOption: a disc that is not within the box, or a perturbation not in [0, 0.1].
+        InvalidState: a start or goal outside of the disc.
+    """
+
+    where_invalid = "outside of the disc"
+
+    def __init__(self, *, centre: Sequence[float] = (1.75, 1.75), radius: float = 1.25,
+                 perturbation: float = 0.01, start: Sequence[float] | None = None, goal: Sequence[float] | None = None,
+                 terminate_on_success: bool = True, normalize_actions: bool = False,
+                 render_mode: str | None = None):
+        x, y = centre
+        if not (radius > 0.0 and min(x, y) >= radius and max(x, y) <= EXTENT - radius):
+            raise InvalidOption(f"centre={centre!r}, radius={radius!r}: the disc must lie within [0, 5]^2")
+        if not 0.0 <= perturbation <= 0.1:
+            raise InvalidOption(f"perturbation={perturbation!r}: expected a number from 0 to 0.1")
+        self.disc = np.array([x, y, radius, perturbation], dtype=np.float64)
+        super().__init__(EXTENT, centre if start is None else start, goal,
+                         terminate_on_success=terminate_on_success, normalize_actions=normalize_actions,
+                         render_mode=render_mode)
+
+    def move(self, states: Array, controls: Array) -> tuple[Array, BoolArray]:
+        """Return the next states [B, 2] and whether the border was hit [B]."""
+        return kernels.move_in_disc(self.settings, self.disc, states, controls)
+
+    def step_one(self, state: list[float], control: list[float]) -> list[float]:
+        """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
+        x, y = state
+        a, b = control
+        return [*kernels.step_one_in_disc(self.settings, self.disc, x, y, a, b)]
+
+    def is_valid(self, states: Array) -> BoolArray:
+        """Return which states [B, 2] lie in the disc [B]."""
+        return kernels.in_disc(self.disc, np.ascontiguousarray(states, dtype=np.float64))
+
+    def render(self) -> Any:
+        """Return the picture as an array [480, 480, 3] of uint8, for "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        x, y, radius, _ = self.disc.tolist()
+        return rasterise(EXTENT, self.walls, self.goal_circle, self._state, ground=(x, y, radius))

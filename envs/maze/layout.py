@@ -1,0 +1,128 @@
+"""Where the walls of a maze are: the one source of FCL boxes, kernel rectangles and pictures."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from envs.maze.generate import Passage, passages_of
+from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.errors import InvalidOption
+
+THICKNESS = 0.1
+MIN_SIZE, MAX_SIZE = 2, 50
+
+
+@dataclass(frozen=True, eq=False)
+class MazeLayout:
+    """A square of `size` x `size` unit cells with walls on their borders.
+
+    Cell (i, j) is the square [i, i + 1] x [j, j + 1]; j grows upwards.
+
+    Attributes:
+        vertical: Whether there is a wall on x = i along row j [size + 1, size].
+        horizontal: Whether there is a wall on y = j along column i [size, size + 1].
+        rectangles: The walls [W, 4] (x0, y0, x1, y1), 0.1 thick, collinear neighbours merged; read-only.
+    """
+
+    vertical: BoolArray
+    horizontal: BoolArray
+    rectangles: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        half = THICKNESS / 2
+        walls = [(x, a, x, b) for x, column in enumerate(self.vertical) for a, b in _runs(column)]
+        walls += [(a, y, b, y) for y, row in enumerate(self.horizontal.T) for a, b in _runs(row)]
+        rectangles = np.array(walls, dtype=np.float64) + np.array([-half, -half, half, half])
+        rectangles.setflags(write=False)
+        object.__setattr__(self, "rectangles", rectangles)
+
+    @property
+    def size(self) -> int:
+        """Number of cells along each axis."""
+        return self.horizontal.shape[0]
+
+    @classmethod
+    def from_size(cls, size: int, maze_seed: int = 0) -> "MazeLayout":
+        """Return the thesis's maze: U for size 2, S for size 3, else a recursive backtracker's.
+
+        Raises:
+            InvalidOption: the size or the seed is out of range.
+        """
+        if not (_is_integer(size) and MIN_SIZE <= size <= MAX_SIZE):
+            raise InvalidOption(f"size={size!r}: expected an integer from {MIN_SIZE} to {MAX_SIZE}")
+        if not (_is_integer(maze_seed) and maze_seed >= 0):
+            raise InvalidOption(f"maze_seed={maze_seed!r}: expected an integer >= 0")
+        return cls.from_passages(int(size), passages_of(int(size), int(maze_seed)))
+
+    @classmethod
+    def from_passages(cls, size: int, passages: Iterable[Passage]) -> "MazeLayout":
+        """Return the maze in which the given pairs of neighbouring cells are connected, and no others."""
+        vertical = np.ones((size + 1, size), dtype=np.bool_)
+        horizontal = np.ones((size, size + 1), dtype=np.bool_)
+        for (i, j), (k, m) in passages:
+            if j == m:
+                vertical[max(i, k), j] = False
+            else:
+                horizontal[i, max(j, m)] = False
+        return cls(vertical, horizontal)
+
+    @classmethod
+    def from_drawing(cls, rows: Sequence[str]) -> "MazeLayout":
+        """Return the maze that is drawn as `draw` draws it: 2 * size + 1 rows, the top one first.
+
+        In a drawing the corners (even row, even column) and the cells (odd, odd) may hold any character; on a
+        border, a space is a passage and `-` or `|` is a wall. The fixed 2x2 maze of the thesis is
+
+            +-+-+
+            |   |
+            +-+ +
+            |   |
+            +-+-+
+
+        Raises:
+            InvalidOption: the drawing is not square, open to the outside, or has other characters on a border.
+        """
+        _check_drawing(rows)
+        grid = np.array([list(row) for row in rows[::-1]]).T  # [column, row], upwards
+        vertical, horizontal = grid[0::2, 1::2], grid[1::2, 0::2]
+        strange = set(np.unique(vertical)) - {" ", "|"} | set(np.unique(horizontal)) - {" ", "-"}
+        if strange:
+            raise InvalidOption(f"layout: expected '-', '|' or ' ' between cells, got {sorted(map(str, strange))}")
+        layout = cls(vertical == "|", horizontal == "-")
+        if not (layout.vertical[[0, -1]].all() and layout.horizontal[:, [0, -1]].all()):
+            raise InvalidOption("layout: the outer walls must be closed")
+        return layout
+
+    def draw(self, marks: dict[tuple[int, int], str] | None = None) -> list[str]:
+        """Return the drawing of the maze, the top row first, with one character in each marked cell (i, j)."""
+        grid = np.full((2 * self.size + 1, 2 * self.size + 1), " ")
+        grid[0::2, 0::2] = "+"
+        grid[0::2, 1::2] = np.where(self.vertical, "|", " ")
+        grid[1::2, 0::2] = np.where(self.horizontal, "-", " ")
+        for (i, j), mark in (marks or {}).items():
+            grid[2 * i + 1, 2 * j + 1] = mark
+        return ["".join(row) for row in grid.T[::-1]]
+
+
+def _runs(present: BoolArray) -> Iterator[tuple[int, int]]:
+    """Yield the half-open ranges in which `present` is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], present, [False])).astype(np.int8)))
+    yield from zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True)
+
+
+def _is_integer(value: object) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _check_drawing(rows: Sequence[str]) -> None:
+    """Refuse what is not a square of characters of a possible size."""
+    if isinstance(rows, str) or not all(isinstance(row, str) for row in rows):
+        raise InvalidOption("layout: expected a list of strings, one for each row of the drawing")
+    size = (len(rows) - 1) // 2
+    if len(rows) % 2 == 0 or not MIN_SIZE <= size <= MAX_SIZE:
+        raise InvalidOption(f"layout: expected 2 * size + 1 rows with size {MIN_SIZE} to {MAX_SIZE}, "
+                            f"got {len(rows)} rows")
+    for number, row in enumerate(rows):
+        if len(row) != len(rows):
+            raise InvalidOption(f"layout: expected {len(rows)} characters in row {number}, got {row!r}")

@@ -1,0 +1,117 @@
+"""The continuous N x N mazes of [Matheron2020] 4.1, 5.4 and 7.3, as the Gymnasium environment `pbcs/Maze-v0`."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from envs.maze import kernels
+from envs.maze.fcl_move import move_by_fcl
+from envs.maze.layout import MazeLayout
+from envs.point_env import MAX_STEP, PointEnv
+from envs.wall_grid import build_wall_grid
+from envs.walls_fcl import WallsFcl
+from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.errors import InvalidOption, did_you_mean
+
+CollisionResponse = Literal["stay", "slide"]
+Collision = Literal["kernel", "fcl"]
+
+
+class MazeEnv(PointEnv):
+    """s' = s + a unless the segment [s, s + a] touches a wall; reward 1 where ||s' - goal|| < 0.2.
+
+    Args:
+        size: Number N of cells along each axis, 2 to 50 (default 2): the fixed U for 2, the hard S for 3, else the
+            maze that a recursive backtracker makes from `maze_seed`.
+        maze_seed: Seed of the maze alone; the seed of `reset` does not change the maze.
+        layout: A drawing in place of size and maze_seed, as `render` prints it for "ansi" (see
+            `MazeLayout.from_drawing`).
+        start: Start position, by default (.5, .5).
+        goal: Centre of the goal, by default (N - .5, N - .5), or (.5, 1.5) for N = 2.
+        wall_penalty: Added to the reward of a step that hits a wall: 0 as in chapter 5 (default), -1 in 4 and 7.
+        collision_response: "stay": a step that hits a wall does not move (the thesis). "slide": it stops 1e-6
+            before the wall (4.7, "traveling in the direction given by a until reaching the wall").
+        terminate_on_success: End the episode in the goal. Differs: the thesis's MDP has no terminal states (False).
+        collision: What decides whether a step hits a wall: the compiled kernel, or FCL (slow; hits from 1e-9 away).
+        normalize_actions: Take actions in [-1, 1]^2, scaled by 0.1.
+        render_mode: "rgb_array", "ansi" or None.
+
+    Raises:
+        InvalidOption: an option out of its range.
+        InvalidState: a start or goal inside a wall or outside of the maze.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["rgb_array", "ansi"], "render_fps": 30}
+
+    def __init__(self, size: int | None = None, maze_seed: int = 0, layout: Sequence[str] | None = None, *,
+                 start: Sequence[float] = (0.5, 0.5), goal: Sequence[float] | None = None,
+                 wall_penalty: float = 0.0, collision_response: CollisionResponse = "stay",
+                 terminate_on_success: bool = True, collision: Collision = "kernel",
+                 normalize_actions: bool = False, render_mode: str | None = None):
+        _check_choice("collision_response", collision_response, ("stay", "slide"))
+        _check_choice("collision", collision, ("kernel", "fcl"))
+        self.layout = _layout(size, maze_seed, layout)
+        self.collision = collision
+        self._fcl = WallsFcl(self.layout.rectangles)
+        size = self.layout.size
+        default_goal = (0.5, 1.5) if size == 2 else (size - 0.5, size - 0.5)
+        super().__init__(size, start, default_goal if goal is None else goal, wall_penalty=wall_penalty,
+                         terminate_on_success=terminate_on_success, normalize_actions=normalize_actions,
+                         max_episode_steps=max(100, 20 * size * size), render_mode=render_mode)
+        self._grid = build_wall_grid(self.layout.rectangles, size, MAX_STEP)
+        self._slide = collision_response == "slide"
+        self.settings = np.append(self.settings, [self._slide, self._grid.cells])
+        assert len(self.settings) == kernels.NUM_SETTINGS
+
+    @property
+    def walls(self) -> Array:
+        """Rectangles [W, 4] (x0, y0, x1, y1)."""
+        return self.layout.rectangles
+
+    def move(self, states: Array, controls: Array) -> tuple[Array, BoolArray]:
+        """Return the next states [B, 2] and whether a wall was hit [B]."""
+        if self.collision == "fcl":
+            return move_by_fcl(self._fcl, states, states + self.displacements(controls), self._slide)
+        grid = self._grid
+        return kernels.move(grid.rectangles, grid.first, grid.nearby, self.settings, states, controls)
+
+    def step_one(self, state: list[float], control: list[float]) -> list[float]:
+        """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
+        if self.collision == "fcl":
+            after, _ = self.move(np.array([state]), np.array([control]))
+            return after[0].tolist()
+        rectangles, first, nearby, _ = self._grid
+        x, y = state
+        a, b = control
+        return [*kernels.step_one(rectangles, first, nearby, self.settings, x, y, a, b)]
+
+    def is_valid(self, states: Array) -> BoolArray:
+        """Return which states [B, 2] are within the bounds and, by FCL, in no wall [B]."""
+        valid = self.in_bounds(states)
+        valid[valid] = ~self._fcl.contains(np.asarray(states)[valid])
+        return valid
+
+    def render(self) -> Any:
+        """Return an array [480, 480, 3] of uint8 for "rgb_array", a drawing with agent A and goal G for "ansi"."""
+        if self.render_mode != "ansi":
+            return super().render()
+        goal = self.goal_circle
+        marks = {} if goal is None else {(int(goal[0]), int(goal[1])): "G"}
+        marks[int(self._state[0]), int(self._state[1])] = "A"
+        return "\n".join(self.layout.draw(marks)) + "\n"
+
+
+def _layout(size: int | None, maze_seed: int, drawing: Sequence[str] | None) -> MazeLayout:
+    if drawing is None:
+        return MazeLayout.from_size(2 if size is None else size, maze_seed)
+    layout = MazeLayout.from_drawing(drawing)
+    if size not in (None, layout.size):
+        raise InvalidOption(f"size={size!r}, but the layout has size {layout.size}; leave size out")
+    return layout
+
+
+def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise InvalidOption(f"{name}={value!r}{did_you_mean(value, choices)}")

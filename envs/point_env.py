@@ -1,0 +1,193 @@
+"""A point that moves in a square: what the mazes, the box and the disc have in common."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box
+
+from envs import point_kernels
+from envs.rendering import rasterise
+from pbcs_ompl.core.contracts import Array, BoolArray, Transition
+from pbcs_ompl.core.errors import InvalidOption, InvalidState
+
+MAX_STEP = 0.1
+GOAL_RADIUS = 0.2
+STAY_INFO = {"hit_wall": False}
+
+
+class PointEnv(gymnasium.Env[Array, Array], ABC):
+    """S = [0, extent]^2, A = [-0.1, 0.1]^2, reward 1 where ||s' - goal|| < 0.2 ([Matheron2020] 3.1, 5.4).
+
+    The state is the observation: the position. Offers the `VectorisedEnv` protocol. Actions outside of the box
+    are clipped. A subclass says how points move (`move`, `step_one`) and where they can be (`is_valid`).
+
+    Args:
+        extent: Edge length of the world.
+        start: Where `reset` puts the point.
+        goal: Centre of the goal, or None for an environment without one: it never ends and rewards nothing.
+        wall_penalty: Added to the reward of a step that hits a wall; 0 or negative.
+        terminate_on_success: End the episode in the goal. Differs: the thesis's MDP has no terminal states (False).
+        normalize_actions: Take actions in [-1, 1]^2, scaled by 0.1.
+        max_episode_steps: Suggested length of an episode (no limit of this class).
+        render_mode: One of `metadata["render_modes"]`, or None.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 30}  # type: ignore[misc]
+    feature_dims = (0, 1)
+    goal_threshold = GOAL_RADIUS
+
+    def __init__(self, extent: float, start: Sequence[float], goal: Sequence[float] | None, *,
+                 wall_penalty: float = 0.0, terminate_on_success: bool = True, normalize_actions: bool = False,
+                 max_episode_steps: int = 1000, render_mode: str | None = None):
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InvalidOption(f"render_mode={render_mode!r}: expected one of {self.metadata['render_modes']}")
+        if not (np.isfinite(wall_penalty) and wall_penalty <= 0):
+            raise InvalidOption(f"wall_penalty={wall_penalty!r}: expected 0 or a negative number, such as -1")
+        self.render_mode = render_mode
+        self.max_episode_steps = max_episode_steps
+        self.state_low = np.zeros(2)
+        self.state_high = np.full(2, float(extent))
+        self.bin_size = np.full(2, 0.1)
+        limit = 1.0 if normalize_actions else MAX_STEP
+        self.action_space = Box(-limit, limit, (2,), np.float64)
+        self.observation_space = Box(self.state_low, self.state_high, dtype=np.float64)
+        self.start = self._checked("start", start)
+        self.goal = None if goal is None else self._checked("goal", goal)
+        self.goal_circle = None if self.goal is None else (*self.goal.tolist(), GOAL_RADIUS)
+        self.settings = np.zeros(point_kernels.FIRST_FREE)
+        self.settings[point_kernels.LIMIT] = limit
+        self.settings[point_kernels.SCALE] = MAX_STEP / limit
+        self.settings[[point_kernels.GOAL_X, point_kernels.GOAL_Y]] = np.inf if self.goal is None else self.goal
+        self.settings[point_kernels.GOAL_RADIUS] = GOAL_RADIUS
+        self.settings[point_kernels.PENALTY] = wall_penalty
+        self.settings[point_kernels.TERMINATE] = terminate_on_success
+        self._state = self.start.copy()
+
+    @abstractmethod
+    def move(self, states: Array, controls: Array) -> tuple[Array, BoolArray]:
+        """Return the next states [B, 2] and whether a wall was hit [B]; the arguments are trusted."""
+
+    @abstractmethod
+    def step_one(self, state: list[float], control: list[float]) -> list[float]:
+        """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
+
+    @abstractmethod
+    def is_valid(self, states: Array) -> BoolArray:
+        """Return which states [B, 2] the point can be in [B]."""
+
+    def in_bounds(self, states: Array) -> BoolArray:
+        """Return which states [B, 2] lie in [0, extent]^2 [B]."""
+        inside = (np.asarray(states) >= self.state_low) & (np.asarray(states) <= self.state_high)
+        return np.logical_and.reduce(inside, axis=1)
+
+    @property
+    def walls(self) -> Array:
+        """Rectangles [W, 4] for pictures."""
+        return np.empty((0, 4))
+
+    def reset(self, *, seed: int | None = None,
+              options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Put the point at the start, or at `options["state"]`.
+
+        Raises:
+            InvalidState: the given state is in a wall, outside, or not finite.
+            InvalidOption: an option other than "state".
+        """
+        super().reset(seed=seed)
+        unknown = set(options or {}) - {"state"}
+        if unknown:
+            raise InvalidOption(f"reset options {sorted(unknown)}: the only option is 'state'")
+        self._state = self._checked("state", (options or {}).get("state", self.start))
+        return self._state.copy(), self._info(hit_wall=False)
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Move by `action` [2]; `info` tells `is_success` (also as `success`), `hit_wall`, `distance_to_goal`."""
+        controls = _as_batch("action", np.reshape(action, (1, -1)), InvalidOption)
+        after, hits = self.move(self._state[None], controls)
+        rewards, terminated, _ = point_kernels.finish(self.settings, after, hits)
+        self._state = after[0]
+        info = self._info(hit_wall=bool(hits[0]))
+        return self._state.copy(), float(rewards[0]), bool(terminated[0]), False, info
+
+    def transition(self, states: Array, controls: Array) -> Transition:
+        """Advance states [B, 2] by one step under controls [B, 2].
+
+        Raises:
+            InvalidState: states of another shape, or not finite.
+            InvalidOption: controls of another shape, or not finite.
+        """
+        states = _as_batch("states", states, InvalidState)
+        controls = _as_batch("controls", controls, InvalidOption)
+        if len(states) != len(controls):
+            raise InvalidOption(f"got {len(controls)} controls for {len(states)} states")
+        after, hits = self.move(states, controls)
+        return Transition(after, *point_kernels.finish(self.settings, after, hits))
+
+    def displacements(self, controls: Array) -> Array:
+        """Return how far controls [B, 2] move the point [B, 2], as the kernels compute it."""
+        limit = self.settings[point_kernels.LIMIT]
+        return np.clip(controls, -limit, limit) * self.settings[point_kernels.SCALE]
+
+    def get_env_state(self) -> Array:
+        """Return the position [2]."""
+        return self._state.copy()
+
+    def set_env_state(self, state: Array) -> None:
+        """Put the point at `state` [2].
+
+        Raises:
+            InvalidState: the state is in a wall, outside, or not finite.
+        """
+        self._state = self._checked("state", state)
+
+    def observe(self, states: Array) -> Array:
+        """Return the observations [B, 2] of states [B, 2]: the positions."""
+        return np.array(states, dtype=np.float64)
+
+    def goal_distance(self, states: Array) -> Array:
+        """Return the distances [B] of states [B, 2] to the centre of the goal; infinite without a goal."""
+        return point_kernels.goal_distance(self.settings, np.ascontiguousarray(states, dtype=np.float64))
+
+    def advance_towards(self, states: Array, targets: Array) -> Array:
+        """Return the controls [B, 2] straight from states [B, 2] to targets [B, 2], clipped to the action box."""
+        limit = self.settings[point_kernels.LIMIT]
+        return np.clip((np.asarray(targets) - states) / self.settings[point_kernels.SCALE], -limit, limit)
+
+    def render(self) -> Any:
+        """Return the picture as an array [height, width, 3] of uint8, for "rgb_array"."""
+        if self.render_mode is None:
+            return None
+        return rasterise(float(self.state_high[0]), self.walls, self.goal_circle, self._state)
+
+    def _info(self, hit_wall: bool) -> dict[str, Any]:
+        distance = float(self.goal_distance(self._state[None])[0])
+        success = distance < GOAL_RADIUS
+        return {"is_success": success, "success": success, "hit_wall": hit_wall, "distance_to_goal": distance}
+
+    def _checked(self, name: str, point: Sequence[float] | Array) -> Array:
+        try:
+            state = np.array(point, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise InvalidState(f"{name}={point!r}: expected two numbers") from error
+        if state.shape != (2,) or not np.isfinite(state).all():
+            raise InvalidState(f"{name}={state.tolist()}: expected two finite numbers")
+        if not self.in_bounds(state[None])[0]:
+            raise InvalidState(f"{name}={state.tolist()} is outside of [0, {self.state_high[0]:g}]^2")
+        if not self.is_valid(state[None])[0]:
+            raise InvalidState(f"{name}={state.tolist()} is {self.where_invalid}; choose another point")
+        return state
+
+    where_invalid = "inside a wall"
+
+
+def _as_batch(name: str, values: Array, error: type[InvalidState] | type[InvalidOption]) -> Array:
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise error(f"{name}: expected an array of shape [B, 2], got {list(array.shape)}")
+    if not np.isfinite(array).all():
+        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise error(f"{name}: row {row} is not finite: {array[row].tolist()}")
+    return array

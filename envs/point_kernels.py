@@ -1,0 +1,50 @@
+"""What the compiled steps of all point environments share: clipping, the goal, the reward."""
+
+import numpy as np
+from numba import njit
+
+from pbcs_ompl.core.contracts import Array, BoolArray
+
+# Places of the settings in the array `settings`, which every kernel takes.
+LIMIT, SCALE, GOAL_X, GOAL_Y, GOAL_RADIUS, PENALTY, TERMINATE, FIRST_FREE = range(8)
+
+
+@njit(cache=True)
+def displacement(settings: Array, a: float) -> float:
+    """Return how far a control moves the point along one axis; NaN stays NaN."""
+    limit = settings[LIMIT]
+    if a > limit:
+        a = limit
+    elif a < -limit:
+        a = -limit
+    return a * settings[SCALE]
+
+
+@njit(cache=True)
+def _distance(settings: Array, x: float, y: float) -> float:
+    dx, dy = x - settings[GOAL_X], y - settings[GOAL_Y]
+    return np.sqrt(dx * dx + dy * dy)
+
+
+@njit(cache=True)
+def goal_distance(settings: Array, states: Array) -> Array:
+    """Return the Euclidean distances [B] of states [B, 2] to the centre of the goal."""
+    distances = np.empty(states.shape[0])
+    for k in range(states.shape[0]):
+        distances[k] = _distance(settings, states[k, 0], states[k, 1])
+    return distances
+
+
+@njit(cache=True)
+def finish(settings: Array, after: Array, hits: BoolArray) -> tuple[Array, BoolArray, BoolArray]:
+    """Return rewards, terminated and success [B] of steps that ended in `after` [B, 2] and hit a wall or not [B]."""
+    count = after.shape[0]
+    rewards = np.empty(count)
+    terminated = np.empty(count, dtype=np.bool_)
+    success = np.empty(count, dtype=np.bool_)
+    for k in range(count):
+        reached = _distance(settings, after[k, 0], after[k, 1]) < settings[GOAL_RADIUS]
+        rewards[k] = (1.0 if reached else 0.0) + (settings[PENALTY] if hits[k] else 0.0)
+        terminated[k] = reached and settings[TERMINATE] != 0.0
+        success[k] = reached
+    return rewards, terminated, success

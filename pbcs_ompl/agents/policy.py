@@ -1,0 +1,103 @@
+"""A policy as plain arrays: what remains of an actor after training, and all that a skill needs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.errors import DamagedFile
+
+Float32Array = NDArray[np.float32]
+LAYER_NORM_EPSILON = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Policy:
+    """A deterministic actor: ReLU layers, a tanh, and an affine map onto the action box. Immutable.
+
+    Attributes:
+        layers: One tuple for each layer: weight [in, out], bias [out], and gain [out], shift [out] where the
+            layer is normalised; float32.
+        action_low, action_high: The box [A].
+    """
+
+    layers: tuple[tuple[Float32Array, ...], ...]
+    action_low: Array
+    action_high: Array
+
+    def __post_init__(self) -> None:
+        for array in _all_arrays(self.layers, self.action_low, self.action_high):
+            array.setflags(write=False)
+
+    @property
+    def observation_size(self) -> int:
+        """Length O of an observation."""
+        return self.layers[0][0].shape[0]
+
+    def act(self, observations: Array) -> Array:
+        """Return the actions [B, A] for observations [B, O]."""
+        values = observations.astype(np.float32)
+        for weight, bias, *norm in self.layers[:-1]:
+            values = values @ weight
+            values += bias
+            if norm:
+                values -= values.mean(axis=-1, keepdims=True)
+                values /= np.sqrt(np.square(values).mean(axis=-1, keepdims=True) + LAYER_NORM_EPSILON)
+                values = values * norm[0] + norm[1]
+            np.maximum(values, 0.0, out=values)
+        weight, bias = self.layers[-1]
+        return to_box(np.tanh(values @ weight + bias), self.action_low, self.action_high)
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """Return the policy as named arrays: low, high, weight_0, bias_0 (gain_0, shift_0), weight_1, ..."""
+        arrays: dict[str, np.ndarray] = {"low": self.action_low.copy(), "high": self.action_high.copy()}
+        for index, layer in enumerate(self.layers):
+            names = ("weight", "bias", "gain", "shift")
+            arrays |= {f"{name}_{index}": array.copy() for name, array in zip(names, layer, strict=False)}
+        return arrays
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Any]) -> "Policy":
+        """Return the policy of `to_arrays()`.
+
+        Raises:
+            DamagedFile: arrays are missing, do not fit together, or hold values that are not finite.
+        """
+        count = sum(name.startswith("weight_") for name in arrays)
+        try:
+            layers = tuple(
+                tuple(np.array(arrays[f"{name}_{index}"], dtype=np.float32)
+                      for name in ("weight", "bias", "gain", "shift")
+                      if name in ("weight", "bias") or f"{name}_{index}" in arrays)
+                for index in range(count))
+            low, high = (np.array(arrays[name], dtype=np.float64) for name in ("low", "high"))
+        except KeyError as error:
+            raise DamagedFile(f"policy without the array {error}") from error
+        _check(layers, low, high)
+        return cls(layers, low, high)
+
+
+def to_box(unit: np.ndarray, low: Array, high: Array) -> Array:
+    """Map values in [-1, 1] onto the box, as float64; rounding never leaves the box."""
+    actions = (unit.astype(np.float64) + 1.0) * (0.5 * (high - low)) + low
+    return np.minimum(np.maximum(actions, low, out=actions), high, out=actions)
+
+
+def _all_arrays(layers: tuple[tuple[Float32Array, ...], ...], low: Array, high: Array) -> list[np.ndarray]:
+    return [*(array for layer in layers for array in layer), low, high]
+
+
+def _check(layers: tuple[tuple[Float32Array, ...], ...], low: Array, high: Array) -> None:
+    widths = [layer[0].shape for layer in layers]
+    chained = all(len(shape) == 2 for shape in widths) and bool(widths) and all(
+        before[1] == after[0] for before, after in pairwise(widths))
+    if not chained or any(array.shape != (layer[0].shape[1],) for layer in layers for array in layer[1:]):
+        raise DamagedFile(f"policy whose layers do not fit together: weights {widths}")
+    if low.shape != (widths[-1][1],) or high.shape != low.shape:
+        raise DamagedFile(f"policy with {widths[-1][1]} outputs and action bounds {low.shape}, {high.shape}")
+    if not all(np.isfinite(array).all() for array in _all_arrays(layers, low, high)):
+        raise DamagedFile("policy with values that are not finite")

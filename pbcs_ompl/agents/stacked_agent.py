@@ -1,0 +1,228 @@
+"""What every algorithm shares: S agents as one stack, their replay, the training loop, saving and loading."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, Self
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from pbcs_ompl.agents.policy import Policy, to_box
+from pbcs_ompl.agents.replay import Replay
+from pbcs_ompl.agents.trained_network import TrainedNetwork
+from pbcs_ompl.agents.update import Compile, choose_device, compiled, quick_arithmetic
+from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.errors import InvalidOption, Mismatch, PbcsError, UnsupportedSpace
+from pbcs_ompl.core.seeding import SeedTree
+
+CHUNK_ROWS = 25_600
+"""Transitions that are drawn from the replay buffers at a time."""
+
+
+class NonFiniteData(PbcsError):
+    """A NaN or an infinity in a transition or in a loss."""
+
+
+class SharedSettings(Protocol):
+    """The settings that every algorithm has."""
+
+    @property
+    def batch_size(self) -> int: ...
+    @property
+    def replay_capacity(self) -> int: ...
+    @property
+    def hidden(self) -> tuple[int, ...]: ...
+
+
+class StackedAgent(ABC):
+    """S independent agents of one algorithm, trained together; axis S comes first everywhere.
+
+    An algorithm is a subclass that says which networks there are, how one update is made, and what its critic
+    thinks. The network called "actor" gives the actions: its outputs, through a tanh, mapped onto the box.
+
+    Args:
+        action_low, action_high: The action box [A], finite.
+        seeds: One for each agent; a stack of S seeds does what S separate agents do.
+        device: "cpu" or "cuda".
+        compile: True, False, or "auto" (where it pays).
+
+    Raises:
+        InvalidOption: an option out of its range.
+        UnsupportedSpace: an action box that is empty or not finite.
+    """
+
+    def __init__(self, observation_size: int, action_low: Any, action_high: Any, settings: SharedSettings,
+                 seeds: Sequence[int], device: str | torch.device, compile: Compile):
+        self.observation_size = observation_size
+        self.action_low, self.action_high = _action_box(action_low, action_high)
+        self.seeds = tuple(int(seed) for seed in seeds)
+        if not self.seeds or observation_size < 1:
+            raise InvalidOption(f"{len(self.seeds)} seeds and {observation_size} observations, expected some")
+        self.device = choose_device(device)
+        self.num_updates = 0
+        self._shared = settings
+        self._compile = compile
+        self._half = self._tensor((self.action_high - self.action_low) / 2.0)
+        self._centre = self._tensor((self.action_high + self.action_low) / 2.0)
+        numbers = [SeedTree(seed).child("weights").integer() for seed in self.seeds]
+        self._networks = self._make_networks([torch.Generator().manual_seed(number) for number in numbers])
+        self._replay = Replay(observation_size, len(self.action_low), seeds=self.seeds,
+                              capacity=settings.replay_capacity, device=self.device)
+        self._run_update = compiled(self._update, compile, self.device)
+
+    @abstractmethod
+    def _make_networks(self, generators: Sequence[torch.Generator]) -> dict[str, TrainedNetwork]:
+        """Return the networks by name; one is called "actor"."""
+
+    @abstractmethod
+    def _rates(self, first: int, count: int) -> Tensor:
+        """Return what updates number first, first + 1, ... (counted from 1) need to know, one row each."""
+
+    @abstractmethod
+    def _update(self, rows: Tensor, rates: Tensor) -> dict[str, Tensor]:
+        """Make one update with mini-batches `rows` [S, B, W]; return the losses [S] by name."""
+
+    @abstractmethod
+    def value(self, observations: Array, actions: Array) -> Array:
+        """Return the critics' values [S, B] of actions [S, B, A] in observations [S, B, O]."""
+
+    def act(self, observations: Array) -> Array:
+        """Return the actors' actions [S, B, A] for observations [S, B, O], without noise."""
+        actor = self._networks["actor"]
+        with torch.inference_mode():
+            outputs, _ = actor.network.forward(actor.weights, self._tensor(observations))
+            return to_box(outputs.tanh_().cpu().numpy(), self.action_low, self.action_high)
+
+    def remember(self, observations: Array, actions: Array, rewards: Array, next_observations: Array,
+                 terminals: Array | BoolArray, mask: BoolArray | None = None) -> None:
+        """Append transitions to the replay buffers.
+
+        Args:
+            observations, next_observations: [S, B, O].
+            actions: [S, B, A].
+            rewards: [S, B].
+            terminals: Whether nothing can be gained after the transition [S, B].
+            mask: Which transitions count [S, B], when seeds contribute different numbers; None for all.
+
+        Raises:
+            InvalidOption: arrays of the wrong shape.
+            NonFiniteData: NaN or infinity in one of them.
+        """
+        batch = np.shape(rewards)
+        size = (self.observation_size,)
+        fields = {"observations": (observations, size), "actions": (actions, self.action_low.shape),
+                  "rewards": (rewards, ()), "next_observations": (next_observations, size),
+                  "terminals": (terminals, ())}
+        if len(batch) != 2 or batch[0] != len(self.seeds):
+            raise InvalidOption(f"rewards have the shape {batch}, expected ({len(self.seeds)}, batch)")
+        for name, (values, tail) in fields.items():
+            if np.shape(values) != batch + tail:
+                raise InvalidOption(f"{name} have the shape {np.shape(values)}, expected {batch + tail}")
+            if not np.isfinite(values if mask is None else values[mask]).all():
+                raise NonFiniteData(f"{name} hold NaN or infinity, after update {self.num_updates}")
+        terminals = np.asarray(terminals, dtype=np.float64)
+        self._replay.add(observations, actions, rewards, next_observations, terminals, mask)
+
+    def forget(self) -> None:
+        """Empty the replay buffers."""
+        self._replay.forget()
+
+    @property
+    def replay_sizes(self) -> np.ndarray:
+        """Number of transitions in each replay buffer [S]."""
+        return self._replay.sizes.copy()
+
+    def train(self, num_updates: int) -> dict[str, np.ndarray]:
+        """Make updates with mini-batches from the replay buffers; return the mean losses [S] by name.
+
+        Raises:
+            InvalidOption: a replay buffer is empty.
+            NonFiniteData: a loss is NaN or infinite; the message names the update.
+        """
+        if num_updates > 0 and not self._replay.sizes.all():
+            seed = self.seeds[int(self._replay.sizes.argmin())]
+            raise InvalidOption(f"no transitions to learn from for seed {seed}; call remember first")
+        batch_size, seeds = self._shared.batch_size, len(self.seeds)
+        chunk = max(1, CHUNK_ROWS // (batch_size * seeds))
+        total: dict[str, np.ndarray] = {}
+        with quick_arithmetic(seeds * batch_size * max(self._shared.hidden) ** 2):
+            for start in range(0, num_updates, chunk):
+                for name, losses in self._train_chunk(min(chunk, num_updates - start)).items():
+                    total[name] = total.get(name, 0.0) + losses.sum(axis=0)
+        return {name: losses / num_updates for name, losses in total.items()}
+
+    def _train_chunk(self, count: int) -> dict[str, np.ndarray]:
+        rows = self._replay.sample(count, self._shared.batch_size)
+        rates = self._rates(self.num_updates + 1, count)
+        steps = [self._run_update(*inputs) for inputs in zip(rows.unbind(), rates.unbind(), strict=True)]
+        losses = {name: torch.stack([step[name] for step in steps]).double().cpu().numpy()
+                  for name in steps[0]}
+        for name, values in losses.items():
+            if not np.isfinite(values).all():
+                update, seed = np.argwhere(~np.isfinite(values))[0]
+                raise NonFiniteData(
+                    f"{name} of seed {self.seeds[seed]} is {values[update, seed]} in update "
+                    f"{self.num_updates + update + 1}; try a smaller learning rate or smaller rewards")
+        self.num_updates += count
+        return losses
+
+    def policy(self, seed_index: int = 0) -> Policy:
+        """Return a copy of one seed's actor that no longer changes."""
+        actor = self._networks["actor"]
+        layers = []
+        for weight, bias, norm in actor.network.split(actor.weights.flat.cpu().clone()):
+            vectors = [part[seed_index, 0] for part in (bias, *(norm or ()))]
+            layers.append(tuple(part.numpy().copy() for part in (weight[seed_index], *vectors)))
+        return Policy(tuple(layers), self.action_low.copy(), self.action_high.copy())
+
+    def state_dict(self) -> dict[str, np.ndarray]:
+        """Return everything that training needs to go on bit for bit, as named arrays."""
+        state = {name: tensor.cpu().numpy().copy() for name, tensor in self._tensors().items()}
+        state |= {f"replay/{name}": array for name, array in self._replay.state_dict().items()}
+        return state | {"num_updates": np.array(self.num_updates), "seeds": np.array(self.seeds)}
+
+    def load_state_dict(self, state: Mapping[str, np.ndarray]) -> None:
+        """Continue from `state_dict()` of an agent with the same settings and seeds.
+
+        Raises:
+            Mismatch: the state is of another algorithm, other networks or other seeds.
+        """
+        tensors = self._tensors()
+        replay = {key.removeprefix("replay/"): state[key] for key in state if key.startswith("replay/")}
+        if not {*tensors, "seeds", "num_updates"} <= set(state) or not self._replay.can_load(replay):
+            raise Mismatch("this is not the state of such an agent: networks or transitions are missing")
+        if tuple(np.ravel(state["seeds"])) != self.seeds:
+            raise Mismatch(f"state of the seeds {np.ravel(state['seeds'])}, expected {self.seeds}")
+        for name, tensor in tensors.items():
+            if np.shape(state[name]) != tuple(tensor.shape):
+                raise Mismatch(f"{name} has {np.size(state[name])} values, expected {tensor.numel()}; "
+                               "the state is of an agent with other settings")
+        for name, tensor in tensors.items():
+            tensor.copy_(torch.from_numpy(np.ascontiguousarray(state[name])))
+        self._replay.load_state_dict(replay)
+        self.num_updates = int(state["num_updates"])
+
+    def clone(self) -> Self:
+        """Return an independent copy that goes on as this one would."""
+        copy = type(self)(self.observation_size, self.action_low, self.action_high, settings=self._shared,
+                          seeds=self.seeds, device=self.device, compile=self._compile)
+        copy.load_state_dict(self.state_dict())
+        return copy
+
+    def _tensors(self) -> dict[str, Tensor]:
+        return {f"{name}/{part}": tensor for name, network in self._networks.items()
+                for part, tensor in network.tensors().items()}
+
+    def _tensor(self, values: Array) -> Tensor:
+        return torch.from_numpy(np.asarray(values, dtype=np.float32)).to(self.device)
+
+
+def _action_box(low: Any, high: Any) -> tuple[Array, Array]:
+    low, high = np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
+    if low.ndim != 1 or low.shape != high.shape or not len(low):
+        raise UnsupportedSpace(f"action bounds of shapes {low.shape} and {high.shape}, expected (A,) twice")
+    if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
+        raise UnsupportedSpace(f"action box from {low} to {high}, expected finite bounds with low < high; "
+                               "wrap the environment in gymnasium.wrappers.RescaleAction")
+    return low, high

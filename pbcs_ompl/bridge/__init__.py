@@ -1,0 +1,1 @@
+"""Gymnasium meets OMPL: an environment becomes a control problem, the path that solves it a trajectory."""

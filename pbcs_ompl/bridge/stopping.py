@@ -1,0 +1,61 @@
+"""When a planner has to end: budget, time, a failed callback, Ctrl-C."""
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from pbcs_ompl.bridge.watch import Watch
+from pbcs_ompl.core.contracts import ProgressCallback
+
+SECONDS_BETWEEN_REPORTS = 0.25
+
+
+def make_stop(watch: Watch, max_seconds: float | None,
+              on_progress: ProgressCallback | None) -> Callable[[], bool]:
+    """Return the function that a termination condition polls; its clock starts now.
+
+    Use it as `ompl.base.PlannerTerminationCondition(stop)`: the form with a period polls from a thread of
+    OMPL's that waits for Python's lock for ever.
+    """
+    began = time.monotonic()
+    deadline = float("inf") if max_seconds is None else began + max_seconds
+    due = float("inf") if on_progress is None else began
+
+    def stop() -> bool:
+        nonlocal due
+        now = time.monotonic()
+        if now >= due and on_progress is not None:
+            due = now + SECONDS_BETWEEN_REPORTS
+            try:
+                on_progress({"transitions": watch.counter.count, "seconds": now - began})
+            except BaseException as error:  # nothing may cross OMPL's C++; `Watch.raise_error` raises it
+                watch.fail(error)
+        return watch.stopped or now >= deadline
+
+    return stop
+
+
+@contextmanager
+def interruptible(watch: Watch) -> Iterator[None]:
+    """Let Ctrl-C end the planner at its next poll instead of raising inside one of OMPL's callbacks.
+
+    A second Ctrl-C raises at once. Handlers that a host application has set, and other threads, are left
+    alone.
+    """
+    usual = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or usual is not signal.default_int_handler:
+        yield
+        return
+
+    def remember(number: int, frame: Any) -> None:
+        watch.fail(KeyboardInterrupt())
+        signal.signal(signal.SIGINT, usual)
+
+    signal.signal(signal.SIGINT, remember)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)

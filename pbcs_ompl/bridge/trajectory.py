@@ -1,0 +1,117 @@
+"""A trajectory: the arrays of a path, which any environment of the same kind can replay bit for bit."""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl.bridge.versions import environment_versions
+from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.errors import DamagedFile, Mismatch
+from pbcs_ompl.core.run_folder import plain, read_arrays, write_arrays
+
+FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """States visited by a sequence of actions.
+
+    Attributes:
+        env_id, env_kwargs: What `gymnasium.make` needs to build the environment.
+        states: States [T+1, D], the first is the start.
+        actions: Actions [T, A], each held for one step.
+        rewards: Rewards [T].
+        planner, seed: Where the trajectory comes from.
+        versions: Versions of the packages the steps depend on.
+    """
+
+    env_id: str
+    env_kwargs: dict[str, Any]
+    states: Array
+    actions: Array
+    rewards: Array
+    planner: str = ""
+    seed: int = 0
+    versions: dict[str, str] = field(default_factory=environment_versions)
+
+    @property
+    def length(self) -> int:
+        """The number of steps T."""
+        return len(self.actions)
+
+    def save(self, path: str | Path) -> None:
+        """Write one npz, atomically and without pickle; the words lie in it as a JSON string.
+
+        Raises:
+            RunFolderError: the file cannot be written.
+        """
+        words = {"format": FORMAT, "env_id": self.env_id, "env_kwargs": self.env_kwargs,
+                 "planner": self.planner, "seed": self.seed, "versions": self.versions}
+        write_arrays(Path(path), metadata=np.array(json.dumps(words, default=plain)), states=self.states,
+                     actions=self.actions, rewards=self.rewards)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Trajectory":
+        """Read what `save` has written.
+
+        Raises:
+            DamagedFile: the file is missing, truncated, of another version, or not ours.
+        """
+        path = Path(path)
+        arrays = read_arrays(path)
+        missing = {"metadata", "states", "actions", "rewards"} - set(arrays)
+        if missing:
+            raise DamagedFile(f"{path} is not a trajectory: it lacks {', '.join(sorted(missing))}")
+        try:
+            words = json.loads(str(arrays["metadata"]))
+            version = words.pop("format")
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise DamagedFile(f"{path} is not a trajectory: its metadata do not parse ({error})") from error
+        if version != FORMAT:
+            raise DamagedFile(f"{path} has format {version}, this of pbcs_ompl reads format {FORMAT}: "
+                              "plan again, or install the version that wrote it")
+        return cls._checked(path, words, arrays)
+
+    @classmethod
+    def _checked(cls, path: Path, words: dict[str, Any], arrays: dict[str, np.ndarray]) -> "Trajectory":
+        states, actions, rewards = arrays["states"], arrays["actions"], arrays["rewards"]
+        steps = len(rewards) if rewards.ndim else -1
+        if states.ndim != 2 or actions.ndim != 2 or len(states) != steps + 1 or len(actions) != steps:
+            raise DamagedFile(f"{path} is damaged: states {states.shape}, actions {actions.shape}, rewards "
+                              f"{rewards.shape}; expected [T+1, D], [T, A], [T]")
+        try:
+            return cls(states=states, actions=actions, rewards=rewards, **words)
+        except TypeError as error:
+            raise DamagedFile(f"{path} is not a trajectory: {error}") from error
+
+    def replay(self, model: ResetAnywhere) -> Array:
+        """Return the states [T+1, D] that the actions lead to from the first state."""
+        states = np.empty_like(self.states)
+        states[0] = self.states[0]
+        for step, action in enumerate(self.actions):
+            states[step + 1] = model.transition(states[step][None], action[None]).states[0]
+        return states
+
+    def replays_exactly(self, model: ResetAnywhere) -> bool:
+        """Whether `replay` gives the same states, bit for bit."""
+        return self.replay(model).tobytes() == self.states.tobytes()
+
+    def check_belongs_to(self, model: ResetAnywhere) -> None:
+        """Refuse a model that the trajectory was not made in.
+
+        Raises:
+            Mismatch: another environment, other options, or other versions of what its steps depend on.
+        """
+        ours = json.loads(json.dumps(self.env_kwargs, default=plain))
+        theirs = json.loads(json.dumps(model.env_kwargs, default=plain))
+        if (self.env_id, ours) != (model.env_id, theirs):
+            raise Mismatch(f"the trajectory was made in {self.env_id} {json.dumps(ours)}, not in "
+                           f"{model.env_id} {json.dumps(theirs)}")
+        installed = environment_versions()
+        for package, version in self.versions.items():
+            if installed.get(package) != version:
+                raise Mismatch(f"the trajectory was made with {package} {version}, installed is "
+                               f"{installed.get(package, 'none')}; plan again, or install that version")

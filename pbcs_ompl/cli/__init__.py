@@ -1,0 +1,29 @@
+"""The command line: parse, call, print. Each verb is one file of this package, imported when it is used.
+
+Exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed,
+130 interrupted.
+"""
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from pbcs_ompl.cli.arguments import build_parser, parse
+from pbcs_ompl.core.errors import PbcsError
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status. Every mistake of the user ends in one line on stderr."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    try:
+        arguments = parse(build_parser(), words)
+        return int(import_module(f"pbcs_ompl.cli.{arguments.verb}").run(arguments))
+    except PbcsError as error:
+        return _complain(f"error: {error}", error.exit_code)
+    except KeyboardInterrupt as interrupt:
+        return _complain(f"interrupted; {interrupt or 'run the same command again to start over'}", 130)
+
+
+def _complain(message: str, status: int) -> int:
+    print("pbcs:", " ".join(message.split()), file=sys.stderr)
+    return status

@@ -1,0 +1,165 @@
+"""The grammar of the command line, and one clear line for each way to get it wrong."""
+
+import argparse
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from pbcs_ompl.cli.values import choice, fraction, integer, json_object, seconds
+from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
+
+METHODS = ("pbcs", "pb", "backplay", "bootstrapped", "offline", "plain")
+PRESETS = ("fast", "thesis")
+DESCRIPTION = """\
+Plan with OMPL in any environment that can be reset anywhere,
+then train a chain of skills along the plan.
+"""
+EPILOG = """\
+examples:
+  pbcs plan --env pbcs/Maze-v0 --env-kwargs '{"size": 9, "maze_seed": 1}' --planner Ex
+  pbcs train --env pbcs/Maze-v0 --env-kwargs '{"size": 5, "maze_seed": 1}' --seed 0
+  pbcs compare --planners Ex RRTNH EST KPIECE1 --env pbcs/Maze-v0 --env-kwargs '{"size": 9}' --seeds 10
+
+exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that raises our errors, guesses no abbreviation, and knows its options by name."""
+
+    def __init__(self, **settings: Any):
+        self.options: list[str] = []
+        self.verbs: dict[str, Parser] = {}
+        settings.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        super().__init__(allow_abbrev=False, **settings)
+
+    def add_argument(self, *names: str, **settings: Any) -> argparse.Action:  # type: ignore[override]
+        self.options += [name for name in names if name.startswith("-")]
+        return super().add_argument(*names, **settings)
+
+    def error(self, message: str) -> NoReturn:
+        raise InvalidOption(f"{message} (see {self.prog} --help)")
+
+
+class _Version(argparse.Action):
+    """Look the version up only when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from pbcs_ompl import __version__
+
+        print(f"pbcs {__version__}")
+        parser.exit()
+
+
+def build_parser() -> Parser:
+    """Return the parser of all verbs."""
+    parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
+    for add in (_doctor, _plan, _train, _eval, _compare):
+        name, purpose = add.__name__.removeprefix("_"), add.__doc__ or ""
+        verb = group.add_parser(name, help=purpose, description=purpose)
+        add(verb)
+        verb.add_argument("--json", action="store_true",
+                          help="end stdout with one JSON object; everything else goes to stderr")
+        parser.verbs[name] = verb
+    return parser
+
+
+def parse(parser: Parser, words: Sequence[str]) -> argparse.Namespace:
+    """Parse the words after `pbcs`.
+
+    Raises:
+        UnknownName: an unknown verb or option; the closest one is suggested.
+        InvalidOption: a missing or malformed value.
+    """
+    if not words:
+        raise InvalidOption(f"a verb is missing; choose from {', '.join(parser.verbs)} (see pbcs --help)")
+    if words[0].startswith("-"):
+        _check_options(words[:1], parser)
+    elif words[0] not in parser.verbs:
+        raise UnknownName("verb", words[0], parser.verbs)
+    else:
+        _check_options(words[1:], parser.verbs[words[0]])
+    arguments, surplus = parser.parse_known_args(words)
+    if surplus:
+        raise InvalidOption(f"unexpected word {surplus[0]!r} (see pbcs {arguments.verb} --help)")
+    return arguments
+
+
+def _check_options(words: Sequence[str], parser: Parser) -> None:
+    for word in words:
+        name = word.partition("=")[0]
+        if name.startswith("--") and name != "--" and name not in parser.options:
+            closest = did_you_mean(name, parser.options)
+            raise InvalidOption(f"unknown option {name}{closest} (see {parser.prog} --help)")
+
+
+def _doctor(verb: Parser) -> None:
+    """show versions, known bad pairs, plug-ins found, and whether an environment can be reset anywhere"""
+    _add_environment(verb, required=False)
+
+
+def _plan(verb: Parser) -> None:
+    """search a trajectory to the goal of an environment with a planner"""
+    _add_environment(verb)
+    verb.add_argument("--planner", default="Ex", metavar="NAME", help="a registered one or module:Class (Ex)")
+    verb.add_argument("--planner-kwargs", type=json_object, default={}, metavar="JSON",
+                      help="options of the planner")
+    _add_seed(verb)
+    _add_budget(verb)
+    verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop after this much wall time")
+    _add_out(verb)
+
+
+def _train(verb: Parser) -> None:
+    """plan a trajectory, then train a chain of skills along it"""
+    _add_environment(verb, required=False)
+    verb.add_argument("--method", type=choice("method", METHODS), default="pbcs", metavar="NAME",
+                      help=f"one of {', '.join(METHODS)} (pbcs)")
+    verb.add_argument("--agent", default="ddpg", metavar="NAME", help="registered, or module:Class (ddpg)")
+    verb.add_argument("--preset", type=choice("preset", PRESETS), default="fast", metavar="NAME",
+                      help="fast: ours; thesis: the settings of [Matheron2020] (fast)")
+    verb.add_argument("--path", metavar="DIR",
+                      help="train along this plan, a folder of pbcs plan or a trajectory")
+    _add_seed(verb)
+    _add_budget(verb)
+    _add_out(verb)
+    verb.add_argument("--resume", metavar="DIR", help="go on with a training run that was stopped")
+
+
+def _eval(verb: Parser) -> None:
+    """run a trained chain of skills many times from the start"""
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train")
+    verb.add_argument("--episodes", type=integer(1), default=100, metavar="N", help="how many rollouts (100)")
+    verb.add_argument("--epsilon", type=fraction, default=0.0, metavar="E",
+                      help="probability of a random action in each step (0)")
+
+
+def _compare(verb: Parser) -> None:
+    """run several planners with several seeds and tabulate what they need"""
+    verb.add_argument("--planners", nargs="+", required=True, metavar="NAME",
+                      help="registered planners or module:Class")
+    _add_environment(verb)
+    verb.add_argument("--seeds", type=integer(1), default=10, metavar="N", help="seeds of each planner (10)")
+    _add_budget(verb)
+    verb.add_argument("--jobs", type=integer(1), metavar="J", help="processes that run side by side")
+    _add_out(verb)
+
+
+def _add_environment(verb: Parser, *, required: bool = True) -> None:
+    verb.add_argument("--env", required=required, metavar="ID", help="a Gymnasium id, such as pbcs/Maze-v0")
+    verb.add_argument("--env-kwargs", type=json_object, default={}, metavar="JSON",
+                      help="options of the environment, such as '{\"size\": 5}'")
+
+
+def _add_seed(verb: Parser) -> None:
+    verb.add_argument("--seed", type=integer(0), default=0, metavar="N", help="seed of everything random (0)")
+
+
+def _add_budget(verb: Parser) -> None:
+    verb.add_argument("--max-transitions", type=integer(1), metavar="N",
+                      help="stop after so many environment steps")
+
+
+def _add_out(verb: Parser) -> None:
+    verb.add_argument("--out", metavar="DIR", help="new folder for the results (one below runs/)")

@@ -1,0 +1,39 @@
+"""`pbcs compare`: planners x seeds on one environment, as a table, a picture and a Planner Arena database."""
+
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from pbcs_ompl.cli.folders import environment_words, fresh_folder
+from pbcs_ompl.cli.pictures import draw_comparison
+from pbcs_ompl.cli.terminal import Report, conclude, duration, list_files, short
+from pbcs_ompl.compare.compare import compare
+
+
+def run(arguments: Namespace) -> int:
+    """Compare, draw, report. Returns 1 when no planner solved any run."""
+    names = "-".join(arguments.planners)
+    out = Path(arguments.out or fresh_folder("compare", arguments.env, names, arguments.seeds))
+    budget = {} if arguments.max_transitions is None else {"max_transitions": arguments.max_transitions}
+    jobs = {} if arguments.jobs is None else {"jobs": arguments.jobs}
+    with Report("compare", count="runs", budget=len(arguments.planners) * arguments.seeds) as report:
+        comparison = compare(arguments.planners, arguments.env, env_kwargs=arguments.env_kwargs,
+                             seeds=arguments.seeds, out=out, on_progress=report, **budget, **jobs)
+    draw_comparison(comparison, f"{environment_words(arguments)}, {arguments.seeds} seeds", out)
+    summary = comparison.summary()
+    conclude(summary, _closing_lines(summary, out), as_json=arguments.json)
+    return 0 if any(row["solved"] for row in summary["rows"]) else 1
+
+
+def _closing_lines(summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
+    lines = [("planner", "solved    95 % interval    transitions    seconds   (medians of the solved runs)")]
+    lines += [(row["planner"], _cells(row)) for row in summary["rows"]]
+    return [*lines, ("files", list_files(out)),
+            ("next", f"plannerarena {summary['database']}   (pip install plannerarena)")]
+
+
+def _cells(row: dict[str, Any]) -> str:
+    share, (low, high) = f"{row['solved']}/{row['runs']}", row["wilson"]
+    transitions = "-" if row["transitions_median"] is None else short(row["transitions_median"])
+    seconds = "-" if row["seconds_median"] is None else duration(row["seconds_median"])
+    return f"{share:<10}{f'{low:.0%} to {high:.0%}':<17}{transitions:<15}{seconds}"

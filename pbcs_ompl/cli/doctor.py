@@ -1,0 +1,99 @@
+"""`pbcs doctor`: what is installed, what does not go together, what was found, what can be reset."""
+
+import os
+import shutil
+from argparse import Namespace
+from importlib.metadata import PackageNotFoundError, version
+from platform import platform, python_version
+from typing import Any
+
+from pbcs_ompl.cli.terminal import conclude
+from pbcs_ompl.core.errors import PlannerUnavailable
+from pbcs_ompl.core.registry import load, load_environments, names
+
+NEEDED = ("pbcs-ompl", "ompl", "gymnasium", "numpy", "scipy", "numba", "python-fcl", "matplotlib", "rich")
+OPTIONAL = ("torch", "safetensors", "mujoco", "gymnasium-robotics", "stable-baselines3")
+
+
+def run(arguments: Namespace) -> int:
+    """Look at everything, change nothing. Returns 3 when a needed library is missing."""
+    versions = {"python": python_version(), **{name: _version(name) for name in NEEDED + OPTIONAL}}
+    missing = [name for name in NEEDED if versions[name] is None]
+    result: dict[str, Any] = {
+        "platform": platform(), "versions": versions, "missing": missing, "problems": bad_pairs(versions),
+        "compiler": find_compiler(), "planners": _planners(), "agents": names("agent"),
+        "environments": _environments(),
+        "environment": _check(arguments) if arguments.env else None,
+    }
+    conclude(result, _closing_lines(result), as_json=arguments.json)
+    return 3 if missing else 0
+
+
+def bad_pairs(versions: dict[str, str | None]) -> list[str]:
+    """Return one line for each pair of installed versions that is known not to work together."""
+    problems = []
+    mujoco = versions.get("mujoco")
+    if mujoco == "4.0.0":
+        problems.append("mujoco 4.0.0 computes wrong accelerations for models with a sparse constraint "
+                        "Jacobian; install mujoco 4.0.1 or newer, or 3.x")
+    if mujoco and versions.get("gymnasium-robotics") and _numbers(mujoco) > (3, 8):
+        problems.append(f"the Fetch, Hand and Kitchen environments of gymnasium-robotics fail with mujoco "
+                        f"{mujoco}; install mujoco 3.8 for them (its mazes and Adroit work with both)")
+    return problems
+
+
+def find_compiler() -> str | None:
+    """Return the C++ compiler that `torch.compile` would use, None when there is none."""
+    candidates = (os.environ.get("CXX"), "g++", "clang++", "c++")
+    return next((path for path in (shutil.which(name) for name in candidates if name) if path), None)
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(".")[:2] if part.isdigit())
+
+
+def _planners() -> dict[str, str]:
+    """Return for each registered planner "ready", or why the installed OMPL cannot build it."""
+    states = {}
+    for name in names("planner"):
+        try:
+            load("planner", name)
+            states[name] = "ready"
+        except PlannerUnavailable as error:
+            states[name] = str(error)
+    return states
+
+
+def _environments() -> list[str]:
+    import gymnasium
+
+    load_environments()
+    return sorted(name for name in gymnasium.registry if name.startswith("pbcs/"))
+
+
+def _check(arguments: Namespace) -> dict[str, Any]:
+    from pbcs_ompl.reset_anywhere import check_resettable, make
+
+    return dict(check_resettable(make(arguments.env, arguments.env_kwargs)).summary())
+
+
+def _closing_lines(result: dict[str, Any]) -> list[tuple[str, str]]:
+    installed = ", ".join(f"{name} {number}" for name, number in result["versions"].items() if number)
+    lines = [("platform", result["platform"]), ("versions", installed)]
+    lines += [("MISSING", f"{name}: pip install {name}") for name in result["missing"]]
+    lines += [("PROBLEM", problem) for problem in result["problems"]]
+    lines.append(("compiler", result["compiler"] or "none: gradient steps run eagerly, several times slower"))
+    ready = [name for name, state in result["planners"].items() if state == "ready"]
+    lines.append(("planners", ", ".join(ready)))
+    lines += [("", f"{name}: {state}") for name, state in result["planners"].items() if state != "ready"]
+    lines += [("agents", ", ".join(result["agents"])), ("envs", ", ".join(result["environments"]))]
+    if result["environment"] is not None:
+        lines += [("reset", f"{name}: {value}") for name, value in result["environment"].items()]
+    return lines

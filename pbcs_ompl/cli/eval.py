@@ -1,0 +1,31 @@
+"""`pbcs eval`: run a trained chain of skills many times from the start."""
+
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from pbcs_ompl.cli.terminal import conclude, percent, short
+from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.skills.chain import SkillChain
+from pbcs_ompl.skills.evaluation import evaluate
+
+
+def run(arguments: Namespace) -> int:
+    """Evaluate and report. Returns 1 when no rollout reached the goal."""
+    chain = SkillChain.load(Path(arguments.dir))
+    model = make(chain.env_id, chain.env_kwargs)
+    evaluation = evaluate(chain, model, episodes=arguments.episodes, epsilon=arguments.epsilon)
+    summary = evaluation.summary()
+    conclude(summary, _closing_lines(arguments, summary), as_json=arguments.json)
+    return 0 if summary["success_rate"] > 0 else 1
+
+
+def _closing_lines(arguments: Namespace, summary: dict[str, Any]) -> list[tuple[str, str]]:
+    noise = f", {arguments.epsilon:.0%} random actions" if arguments.epsilon else ""
+    lines = [("success", percent(summary["success_rate"], summary["wilson"])),
+             ("rollouts", f"{summary['episodes']} from the start{noise}")]
+    if summary["steps_median"] is not None:
+        lines.append(("steps", f"{short(summary['steps_median'])} to the goal, median"))
+    if not arguments.epsilon:
+        lines.append(("next", f"pbcs eval {arguments.dir} --epsilon 0.1"))
+    return lines

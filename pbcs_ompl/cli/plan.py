@@ -1,0 +1,37 @@
+"""`pbcs plan`: search a trajectory to the goal, draw the tree."""
+
+from argparse import Namespace
+from pathlib import Path
+
+from pbcs_ompl.bridge.plan import PlanResult, plan
+from pbcs_ompl.cli.folders import environment_words, fresh_folder
+from pbcs_ompl.cli.pictures import draw_tree
+from pbcs_ompl.cli.terminal import Report, conclude, duration, list_files, short
+from pbcs_ompl.reset_anywhere import make
+
+
+def run(arguments: Namespace) -> int:
+    """Plan, draw, report. Returns 1 when the goal was not reached within the budget."""
+    out = Path(arguments.out or fresh_folder("plan", arguments.env, arguments.planner, arguments.seed))
+    model = make(arguments.env, arguments.env_kwargs)
+    with Report("plan", budget=arguments.max_transitions, max_seconds=arguments.max_seconds) as report:
+        result = plan(model, arguments.planner, planner_kwargs=arguments.planner_kwargs, seed=arguments.seed,
+                      max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds, out=out,
+                      on_progress=report)
+    draw_tree(model, result, out)
+    conclude(result.summary(), _closing_lines(arguments, result, out), as_json=arguments.json)
+    return 0 if result.solved else 1
+
+
+def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[tuple[str, str]]:
+    rate = short(result.transitions / max(result.seconds, 1e-9))
+    effort = f"{short(result.transitions)} transitions, {duration(result.seconds)} ({rate} transitions/s)"
+    lines = [("solved" if result.solved else "not solved", effort), ("tree", f"{short(result.nodes)} nodes")]
+    if result.solved:
+        replay = "replays exactly" if result.replay_ok else "DOES NOT REPLAY (not deterministic?)"
+        lines.append(("path", f"{short(result.path_length)} steps, {replay}"))
+        following = f"pbcs train {environment_words(arguments)} --path {out}"
+    else:
+        following = "the same with a larger --max-transitions or --max-seconds, or another --planner"
+    return [*lines, ("files", list_files(out)), ("next", following)]
+

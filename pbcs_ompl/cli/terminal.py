@@ -1,0 +1,115 @@
+"""What a human sees: progress with rates, a closing summary; and what a script reads: one JSON line."""
+
+import json
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from pbcs_ompl.core.run_folder import plain
+
+SECONDS_BETWEEN_LINES = 10.0
+
+
+class Report:
+    """Progress of one run, shown as a live bar on a terminal and as a line now and then elsewhere.
+
+    It is called with the plain numbers of a `ProgressCallback`. The time left is what budgets leave at the
+    present rate, so it is an upper bound: a search usually ends earlier.
+
+    Args:
+        label: What is being done.
+        count: The number that grows towards the budget, "transitions" for instance.
+        budget: Its largest value, None when there is none.
+        max_seconds: The wall time that may be used, None for any.
+    """
+
+    def __init__(self, label: str, *, count: str = "transitions", budget: int | None = None,
+                 max_seconds: float | None = None):
+        self._label, self._count, self._budget, self._max_seconds = label, count, budget, max_seconds
+        console = Console(stderr=True, highlight=False)
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
+        self._bar = Progress(*columns, console=console, transient=True) if console.is_terminal else None
+
+    def __enter__(self) -> "Report":
+        self._start = self._last_line = time.monotonic()
+        if self._bar is not None:
+            self._task = self._bar.add_task(self._label, total=None)
+            self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, numbers: dict[str, Any]) -> None:
+        now = time.monotonic()
+        seconds = now - self._start
+        share = self._share(float(numbers.get(self._count, 0)), seconds)
+        text = f"{self._label}: {self._describe(numbers, seconds, share)}"
+        if self._bar is not None:
+            total = None if share is None else 1.0
+            self._bar.update(self._task, description=text, total=total, completed=share or 0)
+        elif now - self._last_line > SECONDS_BETWEEN_LINES:
+            self._last_line = now
+            print(text, file=sys.stderr, flush=True)
+
+    def _share(self, count: float, seconds: float) -> float | None:
+        shares = [count / self._budget] if self._budget else []
+        shares += [seconds / self._max_seconds] if self._max_seconds else []
+        return min(1.0, max(shares)) if shares else None
+
+    def _describe(self, numbers: dict[str, Any], seconds: float, share: float | None) -> str:
+        parts = [f"{name.replace('_', ' ')} {short(value)}" for name, value in numbers.items()
+                 if name != "seconds"]
+        if seconds > 0 and self._count in numbers:
+            parts.append(f"{short(numbers[self._count] / seconds)} {self._count}/s")
+        if share:
+            parts.append(f"at most {duration(seconds * (1 - share) / share)} left")
+        return ", ".join(parts)
+
+
+def short(value: Any) -> str:
+    """Write a number for reading: thousands separated, three digits after a small point."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return str(value)
+    return f"{value:,.0f}" if isinstance(value, int) or abs(value) >= 100 else f"{value:.3g}"
+
+
+def duration(seconds: float) -> str:
+    """Write a duration for reading."""
+    if seconds < 10:
+        return f"{seconds:.2g} s"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s" if minutes else f"{rest} s"
+
+
+def percent(rate: float, wilson: Sequence[float]) -> str:
+    """Write a success rate with its 95 % Wilson interval."""
+    return f"{rate:.0%} (95 % interval {wilson[0]:.0%} to {wilson[1]:.0%})"
+
+
+def conclude(result: dict[str, Any], lines: Sequence[tuple[str, str]], *, as_json: bool) -> None:
+    """Print the closing summary, and the JSON object as the last line on stdout if it was asked for."""
+    stream = sys.stderr if as_json else sys.stdout
+    for name, text in lines:
+        print(f"{name:<9} {text}", file=stream)
+    if as_json:
+        stream.flush()
+        print(json.dumps(result, default=plain), flush=True)
+
+
+def warn(message: str) -> None:
+    """Print one line on stderr."""
+    print("pbcs:", " ".join(message.split()), file=sys.stderr)
+
+
+def list_files(folder: Path) -> str:
+    """Name a result folder and what lies in it."""
+    names = sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))
+    return f"{folder}/ ({', '.join(names)})"

@@ -1,0 +1,68 @@
+"""How the words after an option become values. Each raises argparse's own error, which names the option."""
+
+import json
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Iterable
+from math import isfinite
+from typing import Any
+
+from pbcs_ompl.core.errors import did_you_mean
+
+EXPECTED_OBJECT = "expected a JSON object such as '{\"size\": 5}'"
+
+
+def integer(low: int) -> Callable[[str], int]:
+    """Return a reader of whole numbers of at least `low`; 200000, 200_000 and 2e5 are the same."""
+
+    def read(text: str) -> int:
+        value = _number(text)
+        if not isfinite(value) or value != int(value) or value < low:
+            raise ArgumentTypeError(f"expected a whole number of at least {low}, got {text!r}")
+        return int(text) if text.lstrip("+").replace("_", "").isdigit() else int(value)
+
+    return read
+
+
+def seconds(text: str) -> float:
+    """Read a positive number of seconds."""
+    value = _number(text)
+    if not (isfinite(value) and value > 0):
+        raise ArgumentTypeError(f"expected a positive number of seconds, got {text!r}")
+    return value
+
+
+def fraction(text: str) -> float:
+    """Read a number from 0 to 1."""
+    value = _number(text)
+    if not 0 <= value <= 1:
+        raise ArgumentTypeError(f"expected a number from 0 to 1, got {text!r}")
+    return value
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
+
+
+def choice(kind: str, names: Iterable[str]) -> Callable[[str], str]:
+    """Return a reader of one of `names`; the closest is suggested for any other word."""
+
+    def read(text: str) -> str:
+        if text not in names:
+            raise ArgumentTypeError(f"unknown {kind} {text!r}{did_you_mean(text, names)}")
+        return text
+
+    return read
+
+
+def json_object(text: str) -> dict[str, Any]:
+    """Read a JSON object."""
+    try:
+        value = json.loads(text)
+    except ValueError as error:
+        raise ArgumentTypeError(f"{EXPECTED_OBJECT}, got {text!r}: {error}") from error
+    if not isinstance(value, dict):
+        raise ArgumentTypeError(f"{EXPECTED_OBJECT}, got {text!r}")
+    return value

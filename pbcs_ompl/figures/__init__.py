@@ -1,0 +1,1 @@
+"""Pictures of trees, skill chains, critics and comparisons, written without a display."""

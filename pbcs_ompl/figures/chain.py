@@ -1,0 +1,34 @@
+"""A skill chain: trajectory of phase 1, rollout of the chain, activation sets ([Matheron2020] Fig. 7.4)."""
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED
+from pbcs_ompl.figures.maze import draw_line, legend_below, plane, stage
+
+
+def chain_figure(model: ResetAnywhere, *, trajectory: Array | None, rollout: Array | None,
+                 activations: Sequence[tuple[Array, float]], title: str = "") -> Figure:
+    """Draw the planned trajectory [T+1, D], one rollout [T+1, D] of the chain and its activation sets.
+
+    Args:
+        activations: Centre (a state [D]) and radius of each skill's activation set.
+    """
+    figure, axes = stage(model, title)
+    if trajectory is not None:
+        draw_line(axes, plane(model, trajectory), color=RED, linewidth=0.9, alpha=0.8, zorder=3,
+                  label=f"planned, {len(trajectory) - 1} steps")
+    if rollout is not None:
+        draw_line(axes, plane(model, rollout), color=GREEN, linewidth=2, zorder=4,
+                  label=f"skill chain, {len(rollout) - 1} steps")
+    label: str | None = f"{len(activations)} activation set{'s' if len(activations) > 1 else ''}"
+    for centre, radius in activations:
+        x, y = plane(model, centre)[0]
+        axes.add_patch(Circle((x, y), radius, fill=False, edgecolor=PURPLE, linewidth=1.8, zorder=5,
+                              label=label))
+        label = None  # one line in the legend stands for all circles
+    legend_below(axes)
+    return figure

@@ -1,0 +1,61 @@
+"""The stage of every picture: walls, goal and bounds of the first two dimensions of the feature."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+
+from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.errors import Mismatch
+from pbcs_ompl.figures.canvas import WALL, new_figure
+
+GOAL = "#f1c40f"
+
+
+def stage(model: ResetAnywhere, title: str) -> tuple[Figure, Axes]:
+    """Return a figure whose axes show the model's walls and goal, at equal scale.
+
+    Raises:
+        Mismatch: the feature has fewer than two dimensions, so there is no plane to draw.
+    """
+    if len(model.feature_low) < 2:
+        raise Mismatch(f"a picture needs two feature dimensions, {model.env_id} has {len(model.feature_low)}")
+    figure, axes = new_figure()
+    corners = [Rectangle((x0, y0), x1 - x0, y1 - y0) for x0, y0, x1, y1 in np.reshape(model.walls, (-1, 4))]
+    axes.add_collection(PatchCollection(corners, facecolor=WALL, edgecolor="none", zorder=2))
+    if model.goal_circle is not None:
+        x, y, radius = model.goal_circle
+        axes.add_patch(Circle((x, y), radius, facecolor=GOAL, edgecolor="black", linewidth=0.6, zorder=2,
+                              label="goal"))
+    _frame(axes, model)
+    axes.set_title(title, fontsize=10)
+    return figure, axes
+
+
+def plane(model: ResetAnywhere, states: Array) -> Array:
+    """Return where states [B, D] lie in the picture [B, 2]."""
+    return model.feature(np.atleast_2d(states))[:, :2]
+
+
+def draw_line(axes: Axes, points: Array, **style: Any) -> None:
+    """Draw points [T+1, 2] as one line, with a dot where it starts."""
+    (line,) = axes.plot(points[:, 0], points[:, 1], **style)
+    axes.plot(*points[0], marker="o", markersize=5, color=line.get_color(), markeredgecolor="white",
+              zorder=line.get_zorder() + 1)
+
+
+def legend_below(axes: Axes) -> None:
+    """Put the legend under the picture, where it hides nothing."""
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=4, frameon=False, fontsize=9)
+
+
+def _frame(axes: Axes, model: ResetAnywhere) -> None:
+    low, high = model.feature_low[:2], model.feature_high[:2]
+    margin = 0.02 * float(np.max(high - low))
+    axes.set_xlim(low[0] - margin, high[0] + margin)
+    axes.set_ylim(low[1] - margin, high[1] + margin)
+    axes.set_aspect("equal")
+    axes.tick_params(labelsize=8)

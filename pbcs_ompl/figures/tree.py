@@ -1,0 +1,48 @@
+"""An exploration tree, coloured by depth, with the path that was found ([Matheron2020] Figs. 4.2 and 4.3)."""
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from pbcs_ompl.core.contracts import Array, IndexArray, ResetAnywhere
+from pbcs_ompl.figures.canvas import RED
+from pbcs_ompl.figures.maze import draw_line, legend_below, plane, stage
+
+MOST_EDGES = 100_000
+
+
+def tree_figure(model: ResetAnywhere, states: Array, parents: IndexArray, *, path: Array | None = None,
+                title: str = "") -> Figure:
+    """Draw a tree of states [N, D] with parents [N] (a root's parent is -1), and a path [T+1, D] in red.
+
+    A tree of more than 100 000 nodes is thinned evenly; the title says so.
+    """
+    edges = np.flatnonzero(parents >= 0)
+    drawn = edges[:: -(-len(edges) // MOST_EDGES)] if len(edges) > MOST_EDGES else edges
+    if len(drawn) < len(edges):
+        title = f"{title}\n({len(drawn):,} of {len(edges):,} edges drawn)"
+    figure, axes = stage(model, title)
+    points = plane(model, states)
+    depths = depth(parents)[drawn]
+    lines = LineCollection(list(np.stack([points[parents[drawn]], points[drawn]], axis=1)), array=depths,
+                           cmap="winter", linewidths=0.7, zorder=1)
+    axes.add_collection(lines)
+    if len(drawn):
+        figure.colorbar(lines, ax=axes, shrink=0.7, pad=0.02, label="depth in the tree")
+    if path is not None:
+        draw_line(axes, plane(model, path), color=RED, linewidth=1.6, zorder=4,
+                  label=f"path, {len(path) - 1} steps")
+    legend_below(axes)
+    return figure
+
+
+def depth(parents: IndexArray) -> IndexArray:
+    """Return the depth [N] of each node below its root, by doubling: every round jumps twice as far."""
+    ancestors = np.where(parents < 0, np.arange(len(parents)), parents)
+    depths = (parents >= 0).astype(np.int64)
+    while True:
+        jump = depths[ancestors]
+        if not jump.any():
+            return depths
+        depths = depths + jump
+        ancestors = ancestors[ancestors]

@@ -1,0 +1,13 @@
+"""Environments seen as functions of states: one adapter for each family, and the check for authors of environments.
+
+Example:
+    >>> from pbcs_ompl.reset_anywhere import make
+    >>> model = make("pbcs/Maze-v0", {"size": 5})
+    >>> state = model.initial_state()
+"""
+
+from pbcs_ompl.reset_anywhere.adapt import adapt
+from pbcs_ompl.reset_anywhere.check import Check, ResetReport, check_resettable
+from pbcs_ompl.reset_anywhere.make import make
+
+__all__ = ["Check", "ResetReport", "adapt", "check_resettable", "make"]

@@ -1,0 +1,59 @@
+"""Make an environment by id, with errors that name the closest id or option."""
+
+import inspect
+from typing import Any
+
+import gymnasium
+from gymnasium.envs.registration import EnvSpec, load_env_creator
+
+from pbcs_ompl.core.contracts import ResetAnywhere
+from pbcs_ompl.core.errors import InvalidOption, MissingDependency, UnknownName, did_you_mean
+from pbcs_ompl.core.registry import load_environments
+from pbcs_ompl.reset_anywhere.adapt import adapt
+
+
+def make(env_id: str, env_kwargs: dict[str, Any] | None = None) -> ResetAnywhere:
+    """Make the environment `env_id` and return it as a `ResetAnywhere`.
+
+    Args:
+        env_id: An id known to Gymnasium, such as "pbcs/Maze-v0"; packages that announce environments through the
+            entry point group `pbcs_ompl.envs` are imported first. "module:id" imports `module` before.
+        env_kwargs: Options of the environment.
+
+    Raises:
+        UnknownName: no such id.
+        InvalidOption: an option that the environment does not have, or a value that it refuses.
+        MissingDependency: the environment needs a library that is not installed.
+        NoResetAnywhere, UnsupportedSpace: see `adapt`.
+    """
+    load_environments()
+    kwargs = dict(env_kwargs or {})
+    try:
+        spec = gymnasium.spec(env_id)
+    except ModuleNotFoundError as error:
+        raise MissingDependency(f"environment {env_id!r}: there is no module {error.name!r}") from error
+    except gymnasium.error.Error as error:
+        raise UnknownName("environment", env_id, _choices(env_id)) from error
+    try:
+        _check_options(spec, kwargs)
+        env = gymnasium.make(env_id, **kwargs)
+    except (gymnasium.error.DependencyNotInstalled, ModuleNotFoundError) as error:
+        raise MissingDependency(f"environment {env_id!r} needs something that is not installed: {error}") from error
+    return adapt(env)
+
+
+def _choices(env_id: str) -> list[str]:
+    """Return all ids if one is close to `env_id`, else those of plug-ins only: the list would be long."""
+    ids = list(gymnasium.registry)
+    return ids if "did you mean" in did_you_mean(env_id, ids) else [known for known in ids if known.startswith("pbcs/")]
+
+
+def _check_options(spec: EnvSpec, kwargs: dict[str, Any]) -> None:
+    """Refuse options that the environment's constructor does not take."""
+    creator = load_env_creator(spec.entry_point) if isinstance(spec.entry_point, str) else spec.entry_point
+    parameters = inspect.signature(creator).parameters
+    if any(p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters.values()):
+        return
+    for name in kwargs:
+        if name not in parameters:
+            raise InvalidOption(f"{spec.id} has no option {name!r}{did_you_mean(name, parameters)}")

@@ -1,0 +1,172 @@
+"""A chain of skills that acts as one policy, can be saved, loaded and evaluated."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray, ResetAnywhere
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
+from pbcs_ompl.core.run_folder import read_arrays, read_json, write_arrays, write_json
+from pbcs_ompl.skills.episodes import with_random_actions
+from pbcs_ompl.skills.goals import Ball, Goal, Target
+from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
+
+FORMAT = "pbcs_ompl skill chain"
+VERSION = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Skill:
+    """A policy, the set of states in which it may start, and where it leads."""
+
+    policy: SkillPolicy
+    activation: Ball
+    goal: Goal
+
+
+@dataclass(frozen=True)
+class Rollouts:
+    """What a batch of executions of a chain did.
+
+    Attributes:
+        success: Which executions reached the environment's target [B].
+        steps: Steps until then, or until the time limit [B].
+        states: The states of the first execution, for pictures [T+1, D].
+    """
+
+    success: BoolArray
+    steps: IndexArray
+    states: Array
+
+
+@dataclass(frozen=True, eq=False)
+class SkillChain:
+    """Ordered skills, from the environment's start to its target; [Matheron2020] section 7.2.
+
+    The chain switches to a later skill as soon as that skill's activation set is entered, and never goes back.
+
+    Attributes:
+        skills: In the order of execution.
+        env_id, env_kwargs: The environment it was trained in.
+        time_limit: Steps after which an execution counts as failed.
+    """
+
+    skills: tuple[Skill, ...]
+    env_id: str
+    env_kwargs: dict[str, Any]
+    time_limit: int
+
+    def check_belongs_to(self, model: ResetAnywhere) -> None:
+        """Raise Mismatch when the chain was trained in another environment."""
+        if (self.env_id, self.env_kwargs) != (model.env_id, model.env_kwargs):
+            raise Mismatch(f"the skill chain was trained in {self.env_id} {self.env_kwargs}, "
+                           f"not in {model.env_id} {model.env_kwargs}")
+
+    def controller(self, model: ResetAnywhere, count: int = 1) -> "ChainController":
+        """Return a controller of `count` executions side by side."""
+        return ChainController(self, model, count)
+
+    def rollouts(self, model: ResetAnywhere, starts: Array, *, epsilon: float = 0.0,
+                 rng: np.random.Generator | None = None, max_steps: int | None = None) -> Rollouts:
+        """Execute the chain from `starts` [B, D], replacing a share `epsilon` of the actions by random ones."""
+        rng = rng or np.random.default_rng(0)
+        limit = self.time_limit if max_steps is None else max_steps
+        controller = self.controller(model, len(starts))
+        states, trace = starts.copy(), [starts[0].copy()]
+        success = np.zeros(len(starts), dtype=bool)
+        steps = np.full(len(starts), limit, dtype=np.int64)
+        alive = np.arange(len(starts))
+        for step in range(1, limit + 1):
+            controls = with_random_actions(model, controller.act(states[alive], alive), epsilon, rng)
+            outcome = model.transition(states[alive], controls)
+            states[alive] = outcome.states
+            if alive[0] == 0:
+                trace.append(states[0].copy())
+            success[alive] = outcome.success
+            ended = outcome.success | outcome.terminated
+            steps[alive[ended]] = step
+            alive = alive[~ended]
+            if not len(alive):
+                break
+        return Rollouts(success, steps, np.array(trace))
+
+    def rollout(self, model: ResetAnywhere, state: Array, *, epsilon: float = 0.0,
+                rng: np.random.Generator | None = None, max_steps: int | None = None) -> Array:
+        """Return the states [T+1, D] of one execution from `state` [D]."""
+        return self.rollouts(model, state[None], epsilon=epsilon, rng=rng, max_steps=max_steps).states
+
+    def save(self, folder: str | Path) -> None:
+        """Write chain.json (structure), chain.npz (centres) and chain.safetensors (networks)."""
+        folder = Path(folder)
+        save_policies(folder / "chain.safetensors", [skill.policy for skill in self.skills])
+        write_arrays(folder / "chain.npz", centers=np.array([s.activation.center for s in self.skills]),
+                     goals=np.array([_goal_center(s.goal, s.activation) for s in self.skills]))
+        write_json(folder / "chain.json", {
+            "format": FORMAT, "version": VERSION, "env_id": self.env_id, "env_kwargs": self.env_kwargs,
+            "time_limit": self.time_limit,
+            "skills": [{"radius": s.activation.radius, "goal_radius": s.goal.radius,
+                        "goal": "target" if isinstance(s.goal, Target) else "ball"} for s in self.skills]})
+
+    @classmethod
+    def load(cls, folder: str | Path) -> "SkillChain":
+        """Read a chain that `save` wrote.
+
+        Raises:
+            DamagedFile: a file is missing, truncated, or of another version.
+        """
+        folder = Path(folder)
+        structure = read_json(folder / "chain.json")
+        if not isinstance(structure, dict) or structure.get("format") != FORMAT:
+            raise DamagedFile(f"{folder / 'chain.json'} is not a skill chain")
+        if structure["version"] != VERSION:
+            raise DamagedFile(f"{folder / 'chain.json'} has version {structure['version']}, expected {VERSION}")
+        arrays = read_arrays(folder / "chain.npz")
+        policies = load_policies(folder / "chain.safetensors", len(structure["skills"]))
+        try:
+            skills = tuple(
+                Skill(policy, Ball(center, entry["radius"]), _goal(entry, goal))
+                for policy, center, goal, entry in zip(policies, arrays["centers"], arrays["goals"],
+                                                       structure["skills"], strict=True))
+            return cls(skills, structure["env_id"], structure["env_kwargs"], structure["time_limit"])
+        except (KeyError, ValueError) as error:
+            raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error
+
+
+class ChainController:
+    """Which skill each execution is in, and what to do there."""
+
+    def __init__(self, chain: SkillChain, model: ResetAnywhere, count: int):
+        if not chain.skills:
+            raise InvalidOption("the skill chain is empty")
+        self.chain = chain
+        self.model = model
+        self.current = np.zeros(count, dtype=np.int64)
+
+    def act(self, states: Array, members: IndexArray | None = None) -> Array:
+        """Return controls [B, A] for the states [B, D] of the given executions (default: all, in order)."""
+        members = np.arange(len(states)) if members is None else members
+        current = self.current[members]
+        for index in range(1, len(self.chain.skills)):
+            behind = np.flatnonzero(current < index)
+            if len(behind):
+                entered = self.chain.skills[index].activation.contains(self.model, states[behind])
+                current[behind[entered]] = index
+        self.current[members] = current
+        observations = self.model.observe(states)
+        controls = np.empty((len(states), len(self.model.action_low)))
+        for index in np.unique(current):
+            mine = current == index
+            controls[mine] = self.chain.skills[index].policy.act(observations[mine])
+        return controls
+
+
+def _goal_center(goal: Goal, activation: Ball) -> Array:
+    return goal.center if isinstance(goal, Ball) else np.full_like(activation.center, np.nan)
+
+
+def _goal(entry: dict[str, Any], center: Array) -> Goal:
+    if entry["goal"] == "target":
+        return Target(entry["goal_radius"])
+    return Ball(center, entry["goal_radius"])

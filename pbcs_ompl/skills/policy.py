@@ -1,0 +1,104 @@
+"""The policy of one skill: an actor that may see the world relative to its goal."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pbcs_ompl.agents.policy import Policy
+from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.errors import DamagedFile, MissingDependency
+from pbcs_ompl.core.run_folder import write_atomically
+
+HORIZON = 10
+"""Relative observations are measured in the movement of this many steps, so that they are of order one nearby."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Where the observations of a skill are measured from, and in which unit: (o - origin) / scale, [O] each."""
+
+    origin: Array
+    scale: Array
+
+    def __call__(self, observations: Array) -> Array:
+        """Return observations [B, O] in this frame."""
+        return (observations - self.origin) / self.scale
+
+    @classmethod
+    def plain(cls, size: int) -> "Frame":
+        """Return the frame that changes nothing."""
+        return cls(np.zeros(size), np.ones(size))
+
+    @classmethod
+    def around(cls, origin: Array, observations: Array) -> "Frame":
+        """Return the frame around `origin` [O], in units of the movement along a plan's `observations` [T+1, O]."""
+        largest = np.abs(np.diff(observations, axis=0)).max(axis=0)
+        return cls(origin, np.where(largest > 0, HORIZON * largest, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class SkillPolicy:
+    """An immutable actor and the frame it was trained in."""
+
+    actor: Policy
+    frame: Frame
+
+    def act(self, observations: Array) -> Array:
+        """Return the actions [B, A] for plain observations [B, O]."""
+        return self.actor.act(self.frame(observations))
+
+
+def policy_to_arrays(policy: SkillPolicy) -> dict[str, np.ndarray]:
+    """Return a policy as named arrays."""
+    return policy.actor.to_arrays() | {"origin": policy.frame.origin, "scale": policy.frame.scale}
+
+
+def policy_from_arrays(arrays: dict[str, np.ndarray]) -> SkillPolicy:
+    """Return the policy of `policy_to_arrays`.
+
+    Raises:
+        KeyError: an array of the frame is missing.
+        DamagedFile: arrays of the actor are missing or do not fit.
+    """
+    return SkillPolicy(Policy.from_arrays({name: array for name, array in arrays.items()
+                                           if name not in ("origin", "scale")}),
+                       Frame(arrays["origin"], arrays["scale"]))
+
+
+def save_policies(path: Path, policies: list[SkillPolicy]) -> None:
+    """Write the policies of a chain into one safetensors file, atomically."""
+    save, _ = _safetensors()
+    tensors: dict[str, np.ndarray] = {}
+    for index, policy in enumerate(policies):
+        tensors |= {f"{index}.{name}": np.ascontiguousarray(array)
+                    for name, array in policy_to_arrays(policy).items()}
+    write_atomically(path, lambda file: file.write(save(tensors)) and None)
+
+
+def load_policies(path: Path, count: int) -> list[SkillPolicy]:
+    """Read `count` policies.
+
+    Raises:
+        DamagedFile: the file is missing, truncated, or holds other policies.
+    """
+    _, load = _safetensors()
+    try:
+        tensors = load(path.read_bytes())
+    except FileNotFoundError as error:
+        raise DamagedFile(f"{path} does not exist") from error
+    except Exception as error:  # safetensors raises its own SafetensorError, which is no public base class
+        raise DamagedFile(f"{path} is damaged: {error}") from error
+    try:
+        return [policy_from_arrays({name.partition(".")[2]: array for name, array in tensors.items()
+                                    if name.partition(".")[0] == str(index)}) for index in range(count)]
+    except KeyError as error:
+        raise DamagedFile(f"{path} is damaged: it lacks {error}") from error
+
+
+def _safetensors():  # type: ignore[no-untyped-def]  # the two functions of a library without types
+    try:
+        from safetensors.numpy import load, save
+    except ModuleNotFoundError as error:
+        raise MissingDependency('skills are saved with safetensors: pip install "pbcs-ompl[rl]"') from error
+    return save, load

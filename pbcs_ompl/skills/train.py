@@ -1,0 +1,90 @@
+"""From an environment to a trained skill chain."""
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+
+from pbcs_ompl.bridge.trajectory import Trajectory
+from pbcs_ompl.core.contracts import ProgressCallback, ResetAnywhere
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, TrainingStalled, UnknownName
+from pbcs_ompl.core.run_folder import CONFIG, RunFolder, read_toml
+from pbcs_ompl.reset_anywhere import adapt, make
+from pbcs_ompl.skills.config import TrainConfig
+from pbcs_ompl.skills.result import TrainResult
+from pbcs_ompl.skills.training import Training
+
+
+def train(env: str | gymnasium.Env | ResetAnywhere, *, env_kwargs: dict[str, Any] | None = None,
+          trajectory: Trajectory | None = None, out: str | Path | None = None,
+          on_progress: ProgressCallback | None = None, **options: Any) -> TrainResult:
+    """Plan with Ex (unless a trajectory is given) and train skills along the plan.
+
+    Args:
+        env: A Gymnasium id, an environment, or an adapter of one.
+        env_kwargs: Options of the environment, when `env` is an id.
+        trajectory: A plan made before.
+        out: A new folder for config.toml, result.json, trajectory.npz, chain/ and, until the end, checkpoint.npz.
+        on_progress: Called after every session and test with plain numbers.
+        options: The fields of `TrainConfig`: method, agent, preset, settings, agent_settings, seed, max_transitions.
+
+    Raises:
+        UnknownName, InvalidOption: no such method, agent, preset or setting; values out of range.
+        NoResetAnywhere, UnsupportedSpace: the environment does not fit.
+        Mismatch: the trajectory belongs to another environment, or does not reach its goal.
+        RunFolderError: the folder exists, is in use, or cannot be written.
+        CallbackFailed: the environment raised, or returned NaN.
+        TrainingStalled: the budget ended first; its `result` holds what was learnt so far.
+    """
+    config = _config(options)
+    model = _open(env, env_kwargs)
+    if trajectory is not None:
+        trajectory.check_belongs_to(model)
+    if out is None:
+        return _checked(Training(model, config, None, on_progress, False).run(trajectory))
+    with RunFolder(out) as folder:
+        return _checked(Training(model, config, folder, on_progress, False).run(trajectory))
+
+
+def resume(folder: str | Path, *, max_transitions: int | None = None,
+           on_progress: ProgressCallback | None = None) -> TrainResult:
+    """Go on with an interrupted training; the result is that of an uninterrupted one, bit for bit.
+
+    Args:
+        folder: The `out` of the training.
+        max_transitions: A new budget, for a training that has used up its own.
+
+    Raises:
+        RunFolderError: there is nothing to resume, or another process is at it.
+        DamagedFile: a file in the folder is damaged.
+    """
+    with RunFolder(folder, resume=True) as opened:
+        values = read_toml(opened.path / CONFIG)
+        try:
+            env, env_kwargs = values.pop("env"), values.pop("env_kwargs", {})
+            config = TrainConfig(**values | ({"max_transitions": max_transitions} if max_transitions else {}))
+        except (KeyError, TypeError) as error:
+            raise DamagedFile(f"{opened.path / CONFIG} is not the configuration of a training: {error}") from error
+        return _checked(Training(make(env, env_kwargs), config, opened, on_progress, True).run(None))
+
+
+def _checked(result: TrainResult) -> TrainResult:
+    if result.stalled:
+        raise TrainingStalled(result.stalled, result)
+    return result
+
+
+def _config(options: dict[str, Any]) -> TrainConfig:
+    known = TrainConfig.__dataclass_fields__
+    for name in options:
+        if name not in known:
+            raise UnknownName("option of train", name, known)
+    return TrainConfig(**options)
+
+
+def _open(env: str | gymnasium.Env | ResetAnywhere, env_kwargs: dict[str, Any] | None) -> ResetAnywhere:
+    if isinstance(env, str):
+        return make(env, env_kwargs or {})
+    if env_kwargs:
+        raise InvalidOption("env_kwargs go with the id of an environment; this one is built already")
+    return adapt(env) if isinstance(env, gymnasium.Env) else env

@@ -1,0 +1,231 @@
+"""The memory of Ex: bins, their nodes, and how often each was expanded, with O(1) insertion and selection.
+
+Differs from [Matheron2020] Alg. 5: the hash tables W_b, B_s, B_m of lists become sorted slices of two arrays (see
+`runs`), one for the bins and one pool for the nodes of all bins. A bin's slice has room for a power of two of rows;
+when it is full it moves to a slice of twice the size, and its old slice waits in a free list for another bin.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit, types
+from numpy.typing import NDArray
+
+from planners.kernels.runs import MEMBER, RUN, append, choose
+
+SMALLEST = 2  # log2 of the rows of a new bin's slice
+CLASSES = 32  # slice sizes 2**0 .. 2**31
+START, LENGTH, SIZE = 0, 1, 2  # columns of `slices`
+BINS, POOL = 0, 1  # entries of `used`
+
+
+class BinQueue(NamedTuple):
+    """The arrays. R rows of the pool, M rooms for bins, F features, H hash cells (a power of two)."""
+
+    pool: NDArray[np.int32]
+    """Node queues of all bins [R, 3]; the first row of a free slice holds the next free slice of its size, or -1."""
+    slices: NDArray[np.int64]
+    """Of each bin: first row in the pool, length, log2 of the rows [M, 3]."""
+    order: NDArray[np.int32]
+    """The queue of the bins [M, 3]."""
+    cells: NDArray[np.int64]
+    """Integer coordinates of each bin [M, F]."""
+    table: NDArray[np.int32]
+    """Hash table of bin numbers, open addressing, -1 for empty [H]."""
+    free: NDArray[np.int32]
+    """First free slice of each size, -1 for none [CLASSES]."""
+    used: NDArray[np.int64]
+    """Number of bins, and of pool rows ever given away [2]."""
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum(array.nbytes for array in self)
+
+
+_integers = types.int64[:, ::1]
+_entries = types.int32[:, ::1]
+QUEUE_TYPE = types.NamedTuple((_entries, _integers, _entries, _integers, types.int32[::1], types.int32[::1],
+                               types.int64[::1]), BinQueue)
+"""Numba's type of BinQueue."""
+
+
+def empty_queue(num_features: int) -> BinQueue:
+    """Return a queue without bins."""
+    rooms = 64
+    return BinQueue(
+        pool=np.empty((rooms << SMALLEST, 3), np.int32), slices=np.empty((rooms, 3), np.int64),
+        order=np.empty((rooms, 3), np.int32), cells=np.empty((rooms, num_features), np.int64),
+        table=np.full(4 * rooms, -1, np.int32), free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64))
+
+
+def insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_], size: NDArray[np.float64],
+           first: int) -> BinQueue:
+    """Insert nodes first, first + 1, ... of features [B, F], leaving out those of `skip` [B]; return the queue.
+
+    Arrays that were too small are replaced; the queue that was passed is not to be used any more.
+    """
+    done = _insert(queue, features, skip, size, first, 0)
+    while done < len(features):
+        queue = _grow(queue)
+        done = _insert(queue, features, skip, size, first, done)
+    return queue
+
+
+@njit(cache=True)
+def select(queue: BinQueue, uniforms: NDArray[np.float64], nodes: NDArray[np.int64]) -> None:
+    """Write into `nodes` [B] as many selections in a row, by uniform numbers in [0, 1) [B, 2]: bin, then node."""
+    for i in range(len(nodes)):
+        nodes[i] = select_one(queue, uniforms[i, 0], uniforms[i, 1])
+
+
+@njit(cache=True)
+def select_one(queue: BinQueue, for_bin: float, for_node: float) -> int:
+    """Return a node of the lowest count in a bin of the lowest count; raise both counts."""
+    chosen = choose(queue.order, 0, queue.used[BINS], for_bin)
+    return choose(queue.pool, queue.slices[chosen, START], queue.slices[chosen, LENGTH], for_node)
+
+
+@njit(cache=True)
+def insert_one(queue: BinQueue, feature: NDArray[np.float64], size: NDArray[np.float64], node: int) -> bool:
+    """Insert a node of count 0; return False, with the queue unchanged in meaning, where an array is full."""
+    cell = np.empty(len(feature), np.int64)
+    cell_of(feature, size, cell)
+    return _insert_in(queue, cell, node)
+
+
+@njit(cache=True)
+def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[np.int64]) -> int:
+    """Return the position in `table` of a cell [F], or of the empty place where it belongs."""
+    mixed = np.uint64(0)
+    for coordinate in cell:
+        mixed = (mixed ^ np.uint64(coordinate)) * np.uint64(0x9E3779B97F4A7C15)
+        mixed ^= mixed >> np.uint64(29)
+    place = np.int64(mixed & np.uint64(len(table) - 1))
+    while table[place] >= 0:
+        known = cells[table[place]]
+        same = True
+        for axis in range(len(cell)):
+            same = same and known[axis] == cell[axis]
+        if same:
+            return place
+        place = (place + 1) & (len(table) - 1)
+    return place
+
+
+@njit(cache=True)
+def cell_of(feature: NDArray[np.float64], size: NDArray[np.float64], cell: NDArray[np.int64]) -> None:
+    """Write into `cell` [F] the coordinates floor(feature / size); beyond 2**62 cells all is one cell."""
+    for axis in range(len(cell)):
+        cell[axis] = int(min(max(np.floor(feature[axis] / size[axis]), -4.6e18), 4.6e18))
+
+
+@njit(cache=True)
+def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_], size: NDArray[np.float64],
+            first: int, done: int) -> int:
+    """Insert from position `done` on; return where an array was full."""
+    cell = np.empty(features.shape[1], np.int64)
+    while done < len(features):
+        if not skip[done]:
+            cell_of(features[done], size, cell)
+            if not _insert_in(queue, cell, first + done):
+                return done
+        done += 1
+    return done
+
+
+@njit(cache=True)
+def _insert_in(queue: BinQueue, cell: NDArray[np.int64], node: int) -> bool:
+    place = find_cell(queue.cells, queue.table, cell)
+    found = np.int64(queue.table[place])
+    if found < 0:
+        found = _new_bin(queue, cell, place)
+    if found < 0 or not _room(queue, found):
+        return False
+    append(queue.pool, queue.slices[found, START], queue.slices[found, LENGTH], node)
+    queue.slices[found, LENGTH] += 1
+    return True
+
+
+@njit(cache=True)
+def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: int) -> int:
+    """Open a bin at a place of the hash table; return -1 if there is no room for one."""
+    number = np.int64(queue.used[BINS])
+    if number == len(queue.slices):
+        return -1
+    start = _take(queue, SMALLEST)
+    if start < 0:
+        return -1
+    queue.cells[number] = cell
+    queue.slices[number, START] = start
+    queue.slices[number, LENGTH] = 0
+    queue.slices[number, SIZE] = SMALLEST
+    queue.table[place] = number
+    append(queue.order, 0, number, number)
+    queue.used[BINS] += 1
+    return number
+
+
+@njit(cache=True)
+def _room(queue: BinQueue, number: int) -> bool:
+    """Give a full bin a slice of twice the size; return whether there was room."""
+    start, length, size = queue.slices[number]
+    if length < 1 << size:
+        return True
+    moved = _take(queue, size + 1)
+    if moved < 0:
+        return False
+    queue.pool[moved:moved + length] = queue.pool[start:start + length]
+    queue.pool[start, MEMBER] = queue.free[size]
+    queue.free[size] = start
+    queue.slices[number, START] = moved
+    queue.slices[number, SIZE] = size + 1
+    return True
+
+
+@njit(cache=True)
+def _take(queue: BinQueue, size: int) -> int:
+    """Return the first row of a slice of 2**size rows, or -1."""
+    start = np.int64(queue.free[size])
+    if start >= 0:
+        queue.free[size] = queue.pool[start, MEMBER]
+        return start
+    start = queue.used[POOL]
+    if start + (1 << size) > len(queue.pool):
+        return -1
+    queue.used[POOL] += 1 << size
+    return start
+
+
+def _grow(queue: BinQueue) -> BinQueue:
+    """Return a queue with more room of each kind that is short."""
+    bins = int(queue.used[BINS])
+    if bins == len(queue.slices):
+        rooms = 2 * bins
+        table = np.full(4 * rooms, -1, np.int32)
+        cells = _enlarged(queue.cells, bins, rooms)
+        _rehash(cells, table, bins)
+        return queue._replace(slices=_enlarged(queue.slices, bins, rooms), cells=cells, table=table,
+                              order=_enlarged(queue.order, bins, rooms))
+    rows = int(queue.used[POOL])
+    largest = 1 << (int(queue.slices[:bins, SIZE].max(initial=SMALLEST)) + 1)
+    return queue._replace(pool=_enlarged(queue.pool, rows, max(int(1.5 * len(queue.pool)), rows + largest)))
+
+
+def _enlarged(array: np.ndarray, used: int, rows: int) -> np.ndarray:
+    larger = np.empty((rows, *array.shape[1:]), array.dtype)
+    larger[:used] = array[:used]
+    return larger
+
+
+@njit(cache=True)
+def _rehash(cells: NDArray[np.int64], table: NDArray[np.int32], bins: int) -> None:
+    for number in range(bins):
+        table[find_cell(cells, table, cells[number])] = number
+
+
+@njit(cache=True)
+def tied_bins(queue: BinQueue) -> int:
+    """Return how many bins share the lowest count."""
+    bins = queue.used[BINS]
+    return bins - queue.order[bins - 1, RUN]

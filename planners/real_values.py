@@ -1,0 +1,66 @@
+"""OMPL states and controls that are made of real vectors, as flat lists of floats.
+
+OMPL's values do not know their size and do not check indices: they are touched here only.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from ompl import base as ob
+from ompl import control as oc
+
+from pbcs_ompl.core.errors import UnsupportedSpace
+
+VECTORS = (ob.RealVectorStateSpace, oc.RealVectorControlSpace)
+COMPOUNDS = (ob.CompoundStateSpace, oc.CompoundControlSpace)
+
+
+class Leaf(NamedTuple):
+    """A real-vector space inside a space: the subspace indices that lead to it, and itself."""
+
+    path: tuple[int, ...]
+    space: Any
+
+
+def leaves(space: Any) -> list[Leaf]:
+    """Return the real-vector spaces that a state or control space is made of, in order.
+
+    Raises:
+        UnsupportedSpace: a part of it is something else.
+    """
+    if isinstance(space, VECTORS):
+        return [Leaf((), space)]
+    if not isinstance(space, COMPOUNDS):
+        raise UnsupportedSpace(f"a {type(space).__name__}: expected a real-vector space or a compound of them")
+    return [Leaf((index, *leaf.path), leaf.space)
+            for index in range(space.getSubspaceCount()) for leaf in leaves(space.getSubspace(index))]
+
+
+def read(parts: list[Leaf], value: Any) -> list[float]:
+    """Return the floats of a state or control."""
+    floats: list[float] = []
+    for leaf in parts:
+        part = _part(value, leaf.path)
+        floats += [part[dim] for dim in range(leaf.space.getDimension())]
+    return floats
+
+
+def write(parts: list[Leaf], value: Any, floats: Sequence[float]) -> None:
+    """Write as many floats as the space has dimensions into a state or control."""
+    rest = iter(floats)
+    for leaf in parts:
+        part = _part(value, leaf.path)
+        for dim in range(leaf.space.getDimension()):
+            part[dim] = next(rest)
+
+
+def bounds(parts: list[Leaf]) -> tuple[list[float], list[float]]:
+    """Return the lower and upper bounds of all floats."""
+    boxes = [leaf.space.getBounds() for leaf in parts]
+    return sum((list(box.low) for box in boxes), []), sum((list(box.high) for box in boxes), [])
+
+
+def _part(value: Any, path: tuple[int, ...]) -> Any:
+    for index in path:
+        value = value[index]
+    return value

@@ -1,0 +1,226 @@
+"""The one OMPL planner of this package: it grows a tree, and a strategy says where."""
+
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from ompl import base as ob
+
+from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere
+from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, PbcsError
+from pbcs_ompl.core.seeding import SeedTree
+from planners.compiled import CompiledStep, CompiledStrategy
+from planners.door import Door
+from planners.model_door import ModelDoor, check_finite
+from planners.ompl_door import OmplDoor
+from planners.options import positive_integer
+from planners.strategy import Strategy
+from planners.tree import Tree
+
+CHUNK = 4096
+"""Expansions of one compiled call, between two looks at the termination condition: about a millisecond."""
+
+
+class TreePlanner(ob.Planner):
+    """Selects nodes, propagates them, keeps what follows, until a node is in the goal.
+
+    It works on any `ompl.control.SpaceInformation`. After `use_model` it propagates through the environment itself,
+    many nodes at a time. Only exact solutions are reported. Exceptions never cross OMPL: `solve` keeps the first in
+    `error` and answers ABORT. A second `solve` goes on with the same tree; `clear` drops it and goes on with the
+    same random numbers.
+
+    `getPlannerData` tells OMPL of no nodes, because the installed OMPL aborts when Python overrides it; use `tree`
+    or `planner_data`.
+
+    Args:
+        si: The `ompl.control.SpaceInformation`.
+        name: The planner's name.
+        strategy: Which nodes to expand. It belongs to this planner.
+        seed: Equal seeds give equal trees.
+        batch: How many nodes are selected before any of them is expanded; "grow" leaves it to the strategy.
+
+    Attributes:
+        error: What ended the last `solve` abnormally: always a PbcsError, with its cause chained; else None.
+
+    Raises:
+        InvalidOption: `batch` is neither "grow" nor a positive integer.
+    """
+
+    def __init__(self, si: Any, name: str, strategy: Strategy, *, seed: int = 0, batch: int | str = "grow"):
+        super().__init__(si, name)
+        self._batch = None if batch == "grow" else positive_integer("batch", batch)
+        self._strategy = strategy
+        self._seeds = SeedTree(seed)
+        self._rng = self._seeds.child("strategy").generator()
+        self._door: Door | None = None
+        self._tree: Tree | None = None
+        self.error: PbcsError | None = None
+
+    @property
+    def tree(self) -> Tree | None:
+        """The tree as arrays; None before `solve`."""
+        return self._tree
+
+    @property
+    def transitions(self) -> int:
+        """Transitions counted so far."""
+        return 0 if self._door is None else self._door.counter.count
+
+    def use_model(self, model: ResetAnywhere, counter: Counter) -> None:
+        """Propagate through `model` from now on, and count every transition in `counter`; drops the tree."""
+        self._door = ModelDoor(self.getSpaceInformation(), model, counter)
+        self._tree = None
+
+    def clear(self) -> None:
+        """Forget the tree."""
+        super().clear()
+        self._tree = None
+        self.error = None
+
+    def solve(self, ptc: Any) -> Any:
+        """Grow the tree until the goal, the end of the budget, or `ptc`: a condition, a callable or seconds."""
+        self.error = None
+        try:
+            return ob.PlannerStatus(self._solve(_condition(ptc)))
+        except PbcsError as error:
+            self.error = error
+        except Exception as error:
+            self.error = _failure(self.getName(), error)
+        return ob.PlannerStatus(ob.PlannerStatus.ABORT)
+
+    def planner_data(self) -> Any:
+        """Return the tree as new `ompl.base.PlannerData`, which cannot hold controls in the installed OMPL."""
+        data = ob.PlannerData(self.getSpaceInformation())
+        if self._door is None or self._tree is None:
+            return data
+        for node, parent in enumerate(self._tree.parents.tolist()):
+            vertex = ob.PlannerDataVertex(self._door.state(self._tree, node))
+            index = data.addStartVertex(vertex) if parent < 0 else data.addVertex(vertex)
+            if parent >= 0:
+                data.addEdge(parent, index)
+        data.decoupleFromPlanner()
+        return data
+
+    def _solve(self, stop: Any) -> Any:
+        problem = self.getProblemDefinition()
+        if self._door is None:
+            self._door = OmplDoor(self.getSpaceInformation(), self._seeds.child("durations").generator())
+        goal, reached = problem.getGoal(), -1
+        if self._tree is None:
+            reached = self._plant(self._door, goal)
+        tree = self._tree
+        if tree is None:
+            return ob.PlannerStatus.INVALID_START
+        while reached < 0:
+            if self._door.counter.left == 0 or stop():
+                return ob.PlannerStatus.TIMEOUT
+            reached = self._advance(self._door, tree, goal)
+        problem.addSolutionPath(self._door.path(tree, tree.path_to(reached)))
+        return ob.PlannerStatus.EXACT_SOLUTION
+
+    def _plant(self, door: Door, goal: Any) -> int:
+        """Begin the tree with the start states; return one that is in the goal, or -1."""
+        tree, reached = door.new_tree(), -1
+        inputs = self.getPlannerInputStates()
+        inputs.restart()
+        while (state := inputs.nextStart()) is not None:
+            if door.add_root(tree, state, goal):
+                reached = len(tree) - 1
+        if len(tree) > 0:
+            self._strategy.start(door.space(), self._rng)
+            self._strategy.inserted(tree, 0, len(tree))
+            self._tree = tree
+        return reached
+
+    def _advance(self, door: Door, tree: Tree, goal: Any) -> int:
+        """Expand a batch of nodes; return the node in the goal, or -1."""
+        strategy, left, first = self._strategy, door.counter.left, len(tree)
+        if (isinstance(door, ModelDoor) and door.compiled is not None and self._batch in (None, 1)
+                and isinstance(strategy, CompiledStrategy)):
+            return _expand_compiled(strategy, door, tree, door.compiled, min(CHUNK, left))
+        count = self._batch or min(strategy.batch(tree), door.widest_batch)
+        nodes = _checked_nodes(strategy, tree, strategy.select(tree, min(count, left)), min(count, left))
+        controls = _checked_controls(strategy, strategy.controls(tree, nodes), len(nodes))
+        reached = door.expand(tree, nodes, controls, goal)
+        if len(tree) > first:
+            strategy.inserted(tree, first, len(tree))
+        return reached
+
+
+class StrategyPlanner(TreePlanner):
+    """A TreePlanner that is named after its class and makes its strategy from its options.
+
+    Raises:
+        InvalidOption: the strategy knows no such option, or refuses its value.
+    """
+
+    strategy_class: ClassVar[type[Strategy]]
+
+    def __init__(self, si: Any, *, seed: int = 0, batch: int | str = "grow", **options: Any):
+        name = type(self).__name__
+        strategy = self.strategy_class.from_options(options, name)
+        super().__init__(si, name, strategy, seed=seed, batch=batch)
+
+    @classmethod
+    def build(cls, si: Any, *, seed: int, **options: Any) -> Self:
+        """Return a new planner (see core.contracts.PlannerFactory)."""
+        return cls(si, seed=seed, **options)
+
+
+def _condition(ptc: Any) -> Any:
+    """Return the termination condition that `solve` was given, in any of the forms that OMPL's own planners take."""
+    if isinstance(ptc, ob.PlannerTerminationCondition):
+        return ptc
+    return ob.PlannerTerminationCondition(ptc) if callable(ptc) else ob.timedPlannerTerminationCondition(float(ptc))
+
+
+def _failure(planner: str, error: Exception) -> CallbackFailed:
+    text = " ".join(str(error).split()) or "no message"
+    failure = CallbackFailed(f"{planner} met an exception in the environment, goal or strategy: "
+                             f"{type(error).__name__}: {text}")
+    failure.__cause__ = error
+    return failure
+
+
+def _expand_compiled(strategy: CompiledStrategy, door: ModelDoor, tree: Tree, step: CompiledStep, count: int) -> int:
+    first = len(tree)
+    reached = strategy.expand(tree, step, door.feature_dims, count)
+    door.counter.count += len(tree) - first
+    check_finite(tree.states[tree.parents[-1:]], tree.controls[-1:], tree.states[-1:])
+    return reached
+
+
+def _checked_nodes(strategy: Strategy, tree: Tree, nodes: Any, count: int) -> IndexArray:
+    """Refuse nodes that cannot be expanded.
+
+    Raises:
+        CallbackFailed: not `count` integers within the tree, or a terminal node.
+    """
+    name = f"{type(strategy).__name__}.select"
+    if not isinstance(nodes, np.ndarray) or nodes.shape != (count,) or nodes.dtype.kind not in "iu":
+        got = f"{nodes.dtype} {nodes.shape}" if isinstance(nodes, np.ndarray) else type(nodes).__name__
+        raise CallbackFailed(f"{name} returned {got}; expected an array of {count} integers")
+    outside = (nodes < 0) | (nodes >= len(tree))
+    if outside.any():
+        raise CallbackFailed(f"{name} returned the node {nodes[outside][0]}; expected 0 to {len(tree) - 1}")
+    if tree.terminal[nodes].any():
+        raise CallbackFailed(f"{name} returned the node {nodes[tree.terminal[nodes]][0]}, which is terminal")
+    return nodes
+
+
+def _checked_controls(strategy: Strategy, controls: Any, count: int) -> Array:
+    """Refuse controls that cannot be applied.
+
+    Raises:
+        CallbackFailed: not a control for each node, or not within the bounds.
+    """
+    name, space = f"{type(strategy).__name__}.controls", strategy.space
+    expected = (count, len(space.action_low))
+    if not isinstance(controls, np.ndarray) or controls.shape != expected:
+        got = f"an array {controls.shape}" if isinstance(controls, np.ndarray) else type(controls).__name__
+        raise CallbackFailed(f"{name} returned {got}; expected an array {expected}")
+    inside = (controls >= space.action_low) & (controls <= space.action_high)
+    if not inside.all():
+        bad = controls[~inside.all(axis=1)][0]
+        raise CallbackFailed(f"{name} returned {bad.tolist()}; expected controls between {space.action_low.tolist()} and "
+                             f"{space.action_high.tolist()}")
+    return controls

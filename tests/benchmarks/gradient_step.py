@@ -1,0 +1,91 @@
+"""Time one gradient step of DDPG, ours against stable-baselines3's, in one run.
+
+    python tests/benchmarks/gradient_step.py [--compile] [--rounds 9]
+
+Both update actor, critic and targets from a full replay buffer with the same networks, mini-batches of 100 and learning
+rates. Ratios of medians are what counts; the rounds of both alternate, so that both see the same noise.
+"""
+
+import argparse
+import time
+from collections.abc import Callable
+from statistics import median
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from stable_baselines3 import DDPG as TheirDDPG
+from stable_baselines3.common.logger import configure
+
+from pbcs_ompl.agents import DDPG, DDPGSettings
+
+OBSERVATIONS, ACTIONS, FILL, BATCH = 2, 2, 20_000, 100
+BARS = {(64, 64): 6.0, (256, 256): 2.0, (400, 300): 2.0}
+
+
+class Plane(gymnasium.Env[np.ndarray, np.ndarray]):
+    """Nothing but the spaces: the environment is never stepped."""
+
+    observation_space = gymnasium.spaces.Box(-1.0, 1.0, (OBSERVATIONS,), np.float32)
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
+
+    def reset(self, **_: Any) -> tuple[np.ndarray, dict[str, Any]]:
+        return np.zeros(OBSERVATIONS, np.float32), {}
+
+
+def transitions(count: int) -> tuple[np.ndarray, ...]:
+    rng = np.random.default_rng(0)
+    observations, following = rng.uniform(-1, 1, (2, count, OBSERVATIONS))
+    return (observations, rng.uniform(-1, 1, (count, ACTIONS)), rng.uniform(-1, 0, count), following,
+            rng.random(count) < 0.05)
+
+
+def ours(hidden: tuple[int, ...], seeds: int, compile: bool) -> Callable[[int], object]:
+    agent = DDPG(OBSERVATIONS, [-1.0] * ACTIONS, [1.0] * ACTIONS, settings=DDPGSettings(hidden=hidden),
+                 seeds=range(seeds), compile=compile)
+    agent.remember(*(np.stack([field] * seeds) for field in transitions(FILL)))
+    return agent.train
+
+
+def theirs(hidden: tuple[int, ...]) -> Callable[[int], object]:
+    model = TheirDDPG("MlpPolicy", Plane(), policy_kwargs={"net_arch": list(hidden)}, batch_size=BATCH, gamma=0.9,
+                      learning_rate=1e-3, tau=0.005, buffer_size=FILL, device="cpu", seed=0)
+    model.set_logger(configure(format_strings=[]))
+    observations, actions, rewards, following, terminals = transitions(FILL)
+    for row in range(FILL):
+        model.replay_buffer.add(observations[row], following[row], actions[row], rewards[row], terminals[row], [{}])
+    return lambda count: model.train(count, BATCH)
+
+
+def microseconds(rows: list[tuple[Callable[[int], object], int]], rounds: int) -> list[float]:
+    """Return the median time of one update of each (train, updates in a round), after one round to warm up."""
+    times: list[list[float]] = [[] for _ in rows]
+    for _ in range(rounds + 1):
+        for (train, count), into in zip(rows, times, strict=True):
+            start = time.perf_counter()
+            train(count)
+            into.append((time.perf_counter() - start) / count * 1e6)
+    return [median(row[1:]) for row in times]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--compile", action="store_true", help="compile our update with torch.compile")
+    parser.add_argument("--rounds", type=int, default=9)
+    options = parser.parse_args()
+    for hidden, bar in BARS.items():
+        torch.set_num_threads(1)
+        count = 200 if max(hidden) <= 64 else 40
+        rows = [(ours(hidden, 1, options.compile), count), (theirs(hidden), count)]
+        mine, other = microseconds(rows, options.rounds)
+        print(f"{hidden}, one thread: {mine:.0f} us, stable-baselines3 {other:.0f} us: {other / mine:.1f} times faster "
+              f"(bar {bar:g})", flush=True)
+    torch.set_num_threads(2)
+    stack, other = microseconds([(ours((64, 64), 32, options.compile), 20), (theirs((64, 64)), 100)], options.rounds)
+    print(f"(64, 64), 32 seeds, two threads: {stack / 32:.0f} us a seed, stable-baselines3 {other:.0f} us: "
+          f"{other / stack * 32:.1f} times faster (target 8)")
+
+
+if __name__ == "__main__":
+    main()
