@@ -53,8 +53,8 @@ class DiscEnv(PointEnv):
     """The box of which only an off-centre disc can be reached; S stays what planners sample.
 
     A step that would leave the disc does not move, but for a small perturbation that makes repeated attempts
-    visible as dense spots (footnote 2). Differs: the perturbation is a hash of (s, a) instead of a random number,
-    so that the environment is deterministic and paths replay; and it never leads out of the disc.
+    visible as dense spots (footnote 2). Differs: the perturbation is a hash of (s, a) instead of a random
+    number, so that the environment is deterministic and paths replay; and it never leads out of the disc.
 
     Args:
         centre: Centre of the disc; the figures of the thesis give no numbers.
@@ -72,7 +72,8 @@ class DiscEnv(PointEnv):
     where_invalid = "outside of the disc"
 
     def __init__(self, *, centre: Sequence[float] = (1.75, 1.75), radius: float = 1.25,
-                 perturbation: float = 0.01, start: Sequence[float] | None = None, goal: Sequence[float] | None = None,
+                 perturbation: float = 0.01, start: Sequence[float] | None = None,
+                 goal: Sequence[float] | None = None,
                  terminate_on_success: bool = True, normalize_actions: bool = False,
                  render_mode: str | None = None):
         x, y = centre

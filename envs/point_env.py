@@ -15,21 +15,20 @@ from pbcs_ompl.core.errors import InvalidOption, InvalidState
 
 MAX_STEP = 0.1
 GOAL_RADIUS = 0.2
-STAY_INFO = {"hit_wall": False}
 
 
 class PointEnv(gymnasium.Env[Array, Array], ABC):
     """S = [0, extent]^2, A = [-0.1, 0.1]^2, reward 1 where ||s' - goal|| < 0.2 ([Matheron2020] 3.1, 5.4).
 
-    The state is the observation: the position. Offers the `VectorisedEnv` protocol. Actions outside of the box
-    are clipped. A subclass says how points move (`move`, `step_one`) and where they can be (`is_valid`).
+    The state is the observation: the position. Offers the `VectorisedEnv` protocol. Actions outside of the
+    box are clipped. A subclass says how points move (`move`, `step_one`) and where they can be (`is_valid`).
 
     Args:
         extent: Edge length of the world.
         start: Where `reset` puts the point.
         goal: Centre of the goal, or None for an environment without one: it never ends and rewards nothing.
         wall_penalty: Added to the reward of a step that hits a wall; 0 or negative.
-        terminate_on_success: End the episode in the goal. Differs: the thesis's MDP has no terminal states (False).
+        terminate_on_success: End the episode in the goal. Differs: the thesis has no terminal states (False).
         normalize_actions: Take actions in [-1, 1]^2, scaled by 0.1.
         max_episode_steps: Suggested length of an episode (no limit of this class).
         render_mode: One of `metadata["render_modes"]`, or None.
@@ -40,10 +39,12 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
     goal_threshold = GOAL_RADIUS
 
     def __init__(self, extent: float, start: Sequence[float], goal: Sequence[float] | None, *,
-                 wall_penalty: float = 0.0, terminate_on_success: bool = True, normalize_actions: bool = False,
-                 max_episode_steps: int = 1000, render_mode: str | None = None):
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InvalidOption(f"render_mode={render_mode!r}: expected one of {self.metadata['render_modes']}")
+                 wall_penalty: float = 0.0, terminate_on_success: bool = True,
+                 normalize_actions: bool = False, max_episode_steps: int = 1000,
+                 render_mode: str | None = None):
+        modes = self.metadata["render_modes"]
+        if render_mode not in (None, *modes):
+            raise InvalidOption(f"render_mode={render_mode!r}: expected one of {modes}")
         if not (np.isfinite(wall_penalty) and wall_penalty <= 0):
             raise InvalidOption(f"wall_penalty={wall_penalty!r}: expected 0 or a negative number, such as -1")
         self.render_mode = render_mode
@@ -57,10 +58,12 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         self.start = self._checked("start", start)
         self.goal = None if goal is None else self._checked("goal", goal)
         self.goal_circle = None if self.goal is None else (*self.goal.tolist(), GOAL_RADIUS)
+        goal_x, goal_y = (np.inf, np.inf) if self.goal is None else self.goal
         self.settings = np.zeros(point_kernels.FIRST_FREE)
         self.settings[point_kernels.LIMIT] = limit
         self.settings[point_kernels.SCALE] = MAX_STEP / limit
-        self.settings[[point_kernels.GOAL_X, point_kernels.GOAL_Y]] = np.inf if self.goal is None else self.goal
+        self.settings[point_kernels.GOAL_X] = goal_x
+        self.settings[point_kernels.GOAL_Y] = goal_y
         self.settings[point_kernels.GOAL_RADIUS] = GOAL_RADIUS
         self.settings[point_kernels.PENALTY] = wall_penalty
         self.settings[point_kernels.TERMINATE] = terminate_on_success
@@ -104,7 +107,7 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         return self._state.copy(), self._info(hit_wall=False)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Move by `action` [2]; `info` tells `is_success` (also as `success`), `hit_wall`, `distance_to_goal`."""
+        """Move by `action` [2]; `info` has `is_success` = `success`, `hit_wall`, `distance_to_goal`."""
         controls = _as_batch("action", np.reshape(action, (1, -1)), InvalidOption)
         after, hits = self.move(self._state[None], controls)
         rewards, terminated, _ = point_kernels.finish(self.settings, after, hits)
@@ -152,7 +155,7 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         return point_kernels.goal_distance(self.settings, np.ascontiguousarray(states, dtype=np.float64))
 
     def advance_towards(self, states: Array, targets: Array) -> Array:
-        """Return the controls [B, 2] straight from states [B, 2] to targets [B, 2], clipped to the action box."""
+        """Return the controls [B, 2] from states [B, 2] straight to targets [B, 2], clipped to the box."""
         limit = self.settings[point_kernels.LIMIT]
         return np.clip((np.asarray(targets) - states) / self.settings[point_kernels.SCALE], -limit, limit)
 

@@ -37,7 +37,7 @@ def goal_distance(settings: Array, states: Array) -> Array:
 
 @njit(cache=True)
 def finish(settings: Array, after: Array, hits: BoolArray) -> tuple[Array, BoolArray, BoolArray]:
-    """Return rewards, terminated and success [B] of steps that ended in `after` [B, 2] and hit a wall or not [B]."""
+    """Return rewards, terminated and success [B] of steps to `after` [B, 2] that hit a wall or not [B]."""
     count = after.shape[0]
     rewards = np.empty(count)
     terminated = np.empty(count, dtype=np.bool_)

@@ -13,8 +13,8 @@ from pbcs_ompl.core.contracts import Array, BoolArray
 SEGMENT_RADIUS = 1e-9
 """Radius of the capsule around a segment: FCL reports a hit where the segment comes this close to a wall.
 
-FCL cannot test a segment exactly (with radius 0 it misses walls that the end of a segment merely touches), so its
-answer is on the safe side: what touches a wall is a hit, what stays 1.5e-9 away is none.
+With radius 0 FCL misses walls that the end of a segment merely touches. So its answer is on the safe side:
+what touches a wall is a hit, and what stays 2e-9 away is none.
 """
 
 
@@ -40,7 +40,7 @@ class WallsFcl:
     def contains(self, points: Array) -> BoolArray:
         """Return which points [B, 2] lie in a wall, its border included [B].
 
-        The point is a sphere of radius 0, which FCL tests against a box exactly but for the last bit of the pose.
+        The point is a sphere of radius 0, which FCL tests against a box to the last bit of the box's pose.
         """
         inside = np.empty(len(points), dtype=np.bool_)
         place = np.zeros(3)
@@ -59,7 +59,7 @@ class WallsFcl:
         along = np.subtract(end, start)
         length = float(np.hypot(*along))
         x, y = along / length if length > 0.0 else (1.0, 0.0)
-        rotation = np.array([[0.0, y, x], [0.0, -x, y], [1.0, 0.0, 0.0]])  # z, the capsule's axis, turns into (x, y)
+        rotation = np.array([[0.0, y, x], [0.0, -x, y], [1.0, 0.0, 0.0]])  # z, the axis, to (x, y)
         middle = np.array([*(np.add(start, end) / 2.0), 0.0])
         capsule = fcl.CollisionObject(fcl.Capsule(SEGMENT_RADIUS, length), fcl.Transform(rotation, middle))
         return self._collides(capsule)

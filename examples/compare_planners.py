@@ -13,8 +13,9 @@ def main(seeds: str = "5") -> None:
                          seeds=int(seeds), max_transitions=100_000)
     for row in comparison.summary()["rows"]:
         low, high = row["wilson"]
-        print(f"{row['planner']:<10}{row['solved']}/{row['runs']} solved (95 % interval {low:.0%} to {high:.0%}), "
-              f"median {row['transitions_median'] or float('nan'):,.0f} transitions")
+        median = row["transitions_median"] or float("nan")
+        print(f"{row['planner']:<10}{row['solved']}/{row['runs']} solved ({low:.0%} to {high:.0%}), "
+              f"median {median:,.0f} transitions")
 
 
 if __name__ == "__main__":

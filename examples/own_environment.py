@@ -1,10 +1,8 @@
-"""What does an environment of my own need to be planned in? A puck on a table, pushed by small forces, shows it.
+"""What does an environment of my own need to be planned in? A puck on a table shows it.
 
     python examples/own_environment.py
     pbcs plan --env examples.own_environment:Puck-v0
 """
-
-from typing import Any
 
 import gymnasium
 import numpy as np
@@ -18,7 +16,7 @@ GOAL = np.array([0.9, 0.9])
 class Puck(gymnasium.Env):
     """State and observation: x, y, vx, vy. Action: the change of the velocity in one step."""
 
-    # What planners have to know beside Gymnasium's spaces. Bounds and distance suffice; the rest is for Ex and pictures.
+    # What planners know beside Gymnasium's spaces; the last two: what to explore, and the goal in pictures.
     state_low = np.array([0.0, 0.0, -0.1, -0.1])
     state_high = np.array([1.0, 1.0, 0.1, 0.1])
     goal_threshold = 0.1
@@ -30,7 +28,7 @@ class Puck(gymnasium.Env):
         self.observation_space = Box(self.state_low, self.state_high, dtype=np.float64)
         self._state = np.zeros(4)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict]:
+    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
         super().reset(seed=seed)
         self._state = np.array([0.1, 0.1, 0.0, 0.0])
         return self._state.copy(), {}
@@ -38,12 +36,12 @@ class Puck(gymnasium.Env):
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
         velocity = np.clip(self._state[2:] + action, -0.1, 0.1)
         position = self._state[:2] + velocity
-        velocity = np.where((position < 0) | (position > 1), 0.0, velocity)  # the edge of the table stops the puck
+        velocity = np.where((position < 0) | (position > 1), 0.0, velocity)  # the edge stops the puck
         self._state = np.concatenate([np.clip(position, 0, 1), velocity])
         success = bool(self.goal_distance(self._state[None])[0] < self.goal_threshold)
         return self._state.copy(), float(success), success, False, {"is_success": success}
 
-    # The two methods that make it resettable anywhere, and the distance that tells planners where the goal is.
+    # Two methods make it resettable anywhere, and the distance tells planners where the goal is.
     def get_env_state(self) -> np.ndarray:
         return self._state.copy()
 

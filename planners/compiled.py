@@ -9,26 +9,32 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numba import types
+from numba.core.dispatcher import Dispatcher
 
 from pbcs_ompl.core.contracts import Array, IndexArray
+from pbcs_ompl.core.errors import CallbackFailed
 from planners.tree import Tree
 
 _vector = types.float64[::1]
+_matrix = types.float64[:, ::1]
 _integers = types.int64[::1]
 STEP_SIGNATURE = types.Tuple((types.float64, types.boolean, types.boolean))(
-    _vector, _integers, _vector, _vector, _vector)
+    _vector, _matrix, _integers, _matrix, types.int64, _matrix, types.int64)
 STEP_TYPE = types.FunctionType(STEP_SIGNATURE)
 """A first-class function, so that loops over steps are compiled once and cached, whatever the environment."""
 
 
 class CompiledStep(NamedTuple):
-    """A step in the form of a function for Numba; equals `transition` bit for bit."""
+    """A step in the form of a function for Numba, and its parameters; equals `transition` bit for bit."""
 
     step: Any
-    """`step(reals, integers, state [D], control [A], after [D]) -> (reward, terminated, success)` writes the next
-    state into `after`. Compiled with @njit(signature, cache=True), where the signature is
-    "Tuple((float64, boolean, boolean))(float64[::1], int64[::1], float64[::1], float64[::1], float64[::1])"."""
+    """`step(reals, table, integers, states, parent, controls, child) -> (reward, terminated, success)` advances
+    states[parent] under controls[child] and writes states[child]. Compiled with @njit(signature, cache=True) where the
+    signature is "Tuple((f8, b1, b1))(f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, f8[:, ::1], i8)". Rows are given
+    by index because a view of a row costs as much as the step of a point."""
     reals: Array
+    table: Array
+    """Real parameters in rows."""
     integers: IndexArray
 
 
@@ -36,7 +42,7 @@ class CompiledStep(NamedTuple):
 class CompiledModel(Protocol):
     """A model (see core.contracts.ResetAnywhere) that offers its step to compiled loops."""
 
-    def compiled_step(self) -> CompiledStep | tuple[Any, Array, IndexArray] | None:
+    def compiled_step(self) -> CompiledStep | tuple[Any, Array, Array, IndexArray] | None:
         """Return the step, its real and its integer parameters; None where this model has none."""
         ...
 
@@ -55,9 +61,17 @@ class CompiledStrategy(Protocol):
 
 
 def step_of(model: Any) -> CompiledStep | None:
-    """Return the compiled step of a model in the types that the loops expect, or None."""
+    """Return the compiled step of a model, with its own copies of the parameters; None where there is none.
+
+    Raises:
+        CallbackFailed: the step is not compiled for the signature.
+    """
     offered = model.compiled_step() if isinstance(model, CompiledModel) else None
     if offered is None:
         return None
-    step, reals, integers = offered
-    return CompiledStep(step, np.ascontiguousarray(reals, np.float64), np.ascontiguousarray(integers, np.int64))
+    step, reals, table, integers = offered
+    if not isinstance(step, Dispatcher) or STEP_SIGNATURE.args not in step.signatures:
+        raise CallbackFailed(f"compiled_step of {model.env_id} returned {step!r}; expected a function compiled by "
+                             f"@njit(signature), where the signature is {STEP_SIGNATURE}")
+    return CompiledStep(step, np.array(reals, np.float64), np.array(table, np.float64, order="C"),
+                        np.array(integers, np.int64))

@@ -38,8 +38,13 @@ class LeastExpanded(Strategy):
         size = space.bin_size if self._wanted_size is None else self._wanted_size
         if len(size) not in (1, features):
             raise InvalidOption(f"bin_size has {len(size)} numbers; expected 1 or {features}, one for each feature")
-        self._size = np.ascontiguousarray(np.broadcast_to(size, features), dtype=np.float64)
+        self._size = np.array(np.broadcast_to(size, features))
         self.queue = empty_queue(features)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the counters."""
+        return self.queue.nbytes
 
     def batch(self, tree: Tree) -> int:
         """Return the number of bins that are tied for the lowest count."""
@@ -57,7 +62,7 @@ class LeastExpanded(Strategy):
 
     def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:
         """Expand up to `count` nodes one at a time in compiled code (see planners.compiled.CompiledStrategy)."""
-        low, high = self.space.action_low, self.space.action_high
+        low, high = np.array(self.space.action_low), np.array(self.space.action_high)
         uniforms = self.rng.random((count, 2 + len(low)))
         tree.reserve(count)
         done = 0

@@ -9,7 +9,7 @@ from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere, 
 from pbcs_ompl.core.errors import CallbackFailed, Mismatch
 from planners.compiled import CompiledStep, step_of
 from planners.door import Door
-from planners.real_values import leaves, read, write
+from planners.real_values import leaves, read, writer
 from planners.strategy import Space
 from planners.tree import Tree
 
@@ -34,9 +34,10 @@ class ModelDoor(Door):
         self._si = si
         self._model = model
         self._states = leaves(si.getStateSpace())
-        self._controls = leaves(si.getControlSpace())
+        controls = leaves(si.getControlSpace())
+        self._write_state, self._write_control = writer(self._states), writer(controls)
         _check_size("states", self._states, len(model.state_low))
-        _check_size("controls", self._controls, len(model.action_low))
+        _check_size("controls", controls, len(model.action_low))
         self.feature_dims = np.array(model.feature_dims or (), dtype=np.int64)
         self.compiled: CompiledStep | None = step_of(model) if len(self.feature_dims) else None
 
@@ -50,7 +51,8 @@ class ModelDoor(Door):
         """Return an empty tree of states [D] and features [F]."""
         model = self._model
         whole = model.feature_dims == tuple(range(len(model.state_low)))
-        return Tree(len(model.state_low), len(model.action_low), None if whole else len(model.feature_low))
+        return Tree(len(model.state_low), len(model.action_low), None if whole else len(model.feature_low),
+                    expected=0 if self.counter.budget is None else self.counter.left + 1)
 
     def add_root(self, tree: Tree, state: Any, goal: Any) -> bool:
         """Add an OMPL start state; return whether the environment calls it a success."""
@@ -80,17 +82,17 @@ class ModelDoor(Door):
         duration = self._si.getPropagationStepSize()
         states, controls = tree.states[nodes].tolist(), tree.controls[nodes].tolist()
         for values, action in zip(states[:-1], controls[1:], strict=True):
-            write(self._states, state, values)
-            write(self._controls, control, action)
+            self._write_state(state, values)
+            self._write_control(control, action)
             path.append(state, control, duration)
-        write(self._states, state, states[-1])
+        self._write_state(state, states[-1])
         path.append(state)
         return path
 
     def state(self, tree: Tree, node: int) -> Any:
         """Return a node's state as a new OMPL state."""
         state = self._si.allocState()
-        write(self._states, state, tree.states[node].tolist())
+        self._write_state(state, tree.states[node].tolist())
         return state
 
     def _features(self, tree: Tree, states: Array) -> Array | None:

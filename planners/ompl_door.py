@@ -8,7 +8,7 @@ from ompl import control as oc
 from pbcs_ompl.core.contracts import Array, Counter, IndexArray
 from pbcs_ompl.core.errors import CallbackFailed, UnsupportedSpace
 from planners.door import Door
-from planners.real_values import bounds, leaves, write
+from planners.real_values import bounds, leaves, writer
 from planners.strategy import Space
 from planners.tree import Tree
 
@@ -39,6 +39,7 @@ class OmplDoor(Door):
         self._projection = space.getDefaultProjection()
         self._point = np.empty(self._projection.getDimension())
         self._controls = leaves(si.getControlSpace())
+        self._write_control = writer(self._controls)
         self._control = si.allocControl()
         self._durations = (si.getMinControlDuration(), si.getMaxControlDuration())
         self._states: list[Any] = []
@@ -70,7 +71,7 @@ class OmplDoor(Door):
         """Propagate each node; a motion that is invalid from the start adds nothing."""
         least, most = self._durations
         for node, control in zip(nodes.tolist(), controls, strict=True):
-            write(self._controls, self._control, control.tolist())
+            self._write_control(self._control, control.tolist())
             steps = int(self._rng.integers(least, most + 1))
             state = self._si.allocState()
             held = self._si.propagateWhileValid(self._states[node], self._control, steps, state)
@@ -91,7 +92,7 @@ class OmplDoor(Door):
         path = oc.PathControl(self._si)
         step_size = self._si.getPropagationStepSize()
         for node, child in zip(nodes[:-1].tolist(), nodes[1:].tolist(), strict=True):
-            write(self._controls, self._control, tree.controls[child].tolist())
+            self._write_control(self._control, tree.controls[child].tolist())
             path.append(self._states[node], self._control, self._steps[child] * step_size)
         path.append(self._states[nodes[-1]])
         return path

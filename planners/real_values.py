@@ -3,7 +3,7 @@
 OMPL's values do not know their size and do not check indices: they are touched here only.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from ompl import base as ob
@@ -45,13 +45,24 @@ def read(parts: list[Leaf], value: Any) -> list[float]:
     return floats
 
 
-def write(parts: list[Leaf], value: Any, floats: Sequence[float]) -> None:
-    """Write as many floats as the space has dimensions into a state or control."""
-    rest = iter(floats)
-    for leaf in parts:
-        part = _part(value, leaf.path)
-        for dim in range(leaf.space.getDimension()):
-            part[dim] = next(rest)
+def writer(parts: list[Leaf]) -> Callable[[Any, Sequence[float]], None]:
+    """Return a function that writes as many floats as the space has dimensions into a state or control."""
+    if len(parts) == 1 and parts[0].path == ():
+        return _write_vector
+
+    def write(value: Any, floats: Sequence[float]) -> None:
+        first = 0
+        for leaf in parts:
+            last = first + leaf.space.getDimension()
+            _write_vector(_part(value, leaf.path), floats[first:last])
+            first = last
+
+    return write
+
+
+def _write_vector(vector: Any, floats: Sequence[float]) -> None:
+    for dim, number in enumerate(floats):
+        vector[dim] = number
 
 
 def bounds(parts: list[Leaf]) -> tuple[list[float], list[float]]:

@@ -7,7 +7,11 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
 
-GROWTH = 1.5
+GROWTH = 4
+"""Rooms that nobody has written to cost address space, but no memory; copies cost both memory and time."""
+FIRST_ROOM = 1 << 14
+MOST_RESERVED = 1 << 30
+"""Bytes of address space that a tree may ask for in advance."""
 
 
 class Columns(NamedTuple):
@@ -32,9 +36,12 @@ class Tree:
     Args:
         state_size, control_size: D and A.
         feature_size: F, or None where the state is the feature.
+        expected: How many nodes there may be, if that is known: address space is reserved for them.
     """
 
-    def __init__(self, state_size: int, control_size: int, feature_size: int | None = None, *, room: int = 1024):
+    def __init__(self, state_size: int, control_size: int, feature_size: int | None = None, *, expected: int = 0):
+        node_bytes = 8 * (state_size + (feature_size or 0) + control_size) + 13
+        room = max(FIRST_ROOM, min(expected, MOST_RESERVED // node_bytes))
         states = np.empty((room, state_size))
         features = states if feature_size is None else np.empty((room, feature_size))
         self.columns = Columns(states, features, np.empty((room, control_size)), np.empty(room, np.int32),
@@ -76,8 +83,9 @@ class Tree:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays, rooms included."""
-        return sum({id(column): column.nbytes for column in self.columns}.values())
+        """Bytes of the nodes; rooms that were never written to are not counted."""
+        distinct = {id(column): column for column in self.columns}.values()
+        return sum(column[:self._size].nbytes for column in distinct)
 
     def append(self, states: Array, parents: Any, controls: Array | float, rewards: Array | float,
                terminal: BoolArray | bool, features: Array | None = None) -> None:
@@ -100,7 +108,7 @@ class Tree:
         needed = self._size + count
         if needed <= len(self.columns.parents):
             return
-        room = max(needed, int(GROWTH * len(self.columns.parents)))
+        room = max(needed, GROWTH * len(self.columns.parents))
         distinct = {id(column): column for column in self.columns}
         larger = {key: _enlarged(column, self._size, room) for key, column in distinct.items()}
         self.columns = Columns(*(larger[id(column)] for column in self.columns))

@@ -16,8 +16,8 @@ from planners.options import positive_integer
 from planners.strategy import Strategy
 from planners.tree import Tree
 
-CHUNK = 4096
-"""Expansions of one compiled call, between two looks at the termination condition: about a millisecond."""
+CHUNK = 2048
+"""Expansions of one compiled call, between two looks at the termination condition: less than a millisecond."""
 
 
 class TreePlanner(ob.Planner):
@@ -59,6 +59,11 @@ class TreePlanner(ob.Planner):
     def tree(self) -> Tree | None:
         """The tree as arrays; None before `solve`."""
         return self._tree
+
+    @property
+    def strategy(self) -> Strategy:
+        """What chooses the nodes."""
+        return self._strategy
 
     @property
     def transitions(self) -> int:

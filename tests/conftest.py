@@ -1,7 +1,7 @@
 """A table of maze solve rates as the last words of a test run.
 
-A test of tests/mazes/ states what it measured with `record_property("solve_rate", [who, size, solved, runs])`. Under
-pytest-xdist the properties come back to the main process with the reports.
+A test of tests/mazes/ states what it measured: `record_property("solve_rate", [who, size, solved, runs])`.
+Under pytest-xdist the properties come back to the main process with the reports.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,8 @@ def rate_table(rates: list[list]) -> list[str]:
     cells = {(who, size): f"{solved}/{runs} {_interval(solved, runs)}" for who, size, solved, runs in rates}
     sizes = sorted({size for _, size in cells})
     rows = [["", *(f"{size}x{size}" for size in sizes)]]
-    rows += [[who, *(cells.get((who, size), "") for size in sizes)] for who in sorted({who for who, _ in cells})]
+    for name in sorted({who for who, _ in cells}):
+        rows.append([name, *(cells.get((name, size), "") for size in sizes)])
     return ["".join(f"{cell:<20}" for cell in row).rstrip() for row in rows]
 
 

@@ -31,9 +31,9 @@ def hits_rectangle(x0: float, y0: float, x1: float, y1: float,
                    left: float, bottom: float, right: float, top: float) -> bool:
     """Tell whether the segment (x0, y0)-(x1, y1) touches the closed rectangle.
 
-    Separating axes: the two of the rectangle, compared exactly, then the normal of the segment, on which the two
-    extreme corners are compared. A pass so close to a corner that rounding hides the sign counts as a hit: no
-    hit is ever missed.
+    Separating axes: the two of the rectangle, compared exactly, then the normal of the segment, on which the
+    two extreme corners are compared. A pass so close to a corner that rounding hides the sign is a hit, so
+    that none is ever missed.
     """
     if max(x0, x1) < left or min(x0, x1) > right or max(y0, y1) < bottom or min(y0, y1) > top:
         return False

@@ -81,21 +81,22 @@ class MazeLayout:
             +-+-+
 
         Raises:
-            InvalidOption: the drawing is not square, open to the outside, or has other characters on a border.
+            InvalidOption: the drawing is not square, open to the outside, or has other marks on a border.
         """
         _check_drawing(rows)
         grid = np.array([list(row) for row in rows[::-1]]).T  # [column, row], upwards
         vertical, horizontal = grid[0::2, 1::2], grid[1::2, 0::2]
         strange = set(np.unique(vertical)) - {" ", "|"} | set(np.unique(horizontal)) - {" ", "-"}
         if strange:
-            raise InvalidOption(f"layout: expected '-', '|' or ' ' between cells, got {sorted(map(str, strange))}")
+            found = "".join(sorted(strange))
+            raise InvalidOption(f"layout: expected '-', '|' or ' ' between cells, got {found!r}")
         layout = cls(vertical == "|", horizontal == "-")
         if not (layout.vertical[[0, -1]].all() and layout.horizontal[:, [0, -1]].all()):
             raise InvalidOption("layout: the outer walls must be closed")
         return layout
 
     def draw(self, marks: dict[tuple[int, int], str] | None = None) -> list[str]:
-        """Return the drawing of the maze, the top row first, with one character in each marked cell (i, j)."""
+        """Return the drawing of the maze, the top row first, with a character in each marked cell (i, j)."""
         grid = np.full((2 * self.size + 1, 2 * self.size + 1), " ")
         grid[0::2, 0::2] = "+"
         grid[0::2, 1::2] = np.where(self.vertical, "|", " ")

@@ -1,4 +1,4 @@
-"""The continuous N x N mazes of [Matheron2020] 4.1, 5.4 and 7.3, as the Gymnasium environment `pbcs/Maze-v0`."""
+"""The continuous N x N mazes of [Matheron2020] 4.1, 5.4 and 7.3: `pbcs/Maze-v0`."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar, Literal
@@ -22,18 +22,18 @@ class MazeEnv(PointEnv):
     """s' = s + a unless the segment [s, s + a] touches a wall; reward 1 where ||s' - goal|| < 0.2.
 
     Args:
-        size: Number N of cells along each axis, 2 to 50 (default 2): the fixed U for 2, the hard S for 3, else the
-            maze that a recursive backtracker makes from `maze_seed`.
+        size: Number N of cells along each axis, 2 to 50 (default 2): the fixed U for 2, the hard S for 3,
+            else the maze that a recursive backtracker makes from `maze_seed`.
         maze_seed: Seed of the maze alone; the seed of `reset` does not change the maze.
         layout: A drawing in place of size and maze_seed, as `render` prints it for "ansi" (see
             `MazeLayout.from_drawing`).
         start: Start position, by default (.5, .5).
         goal: Centre of the goal, by default (N - .5, N - .5), or (.5, 1.5) for N = 2.
-        wall_penalty: Added to the reward of a step that hits a wall: 0 as in chapter 5 (default), -1 in 4 and 7.
+        wall_penalty: Added to the reward of a step that hits a wall: 0 (default) in chapter 5, -1 in 4 and 7.
         collision_response: "stay": a step that hits a wall does not move (the thesis). "slide": it stops 1e-6
             before the wall (4.7, "traveling in the direction given by a until reaching the wall").
-        terminate_on_success: End the episode in the goal. Differs: the thesis's MDP has no terminal states (False).
-        collision: What decides whether a step hits a wall: the compiled kernel, or FCL (slow; hits from 1e-9 away).
+        terminate_on_success: End the episode in the goal. Differs: the thesis has no terminal states (False).
+        collision: What decides whether a step hits a wall: the compiled kernel, or FCL (slow).
         normalize_actions: Take actions in [-1, 1]^2, scaled by 0.1.
         render_mode: "rgb_array", "ansi" or None.
 
@@ -94,7 +94,7 @@ class MazeEnv(PointEnv):
         return valid
 
     def render(self) -> Any:
-        """Return an array [480, 480, 3] of uint8 for "rgb_array", a drawing with agent A and goal G for "ansi"."""
+        """Return an image [480, 480, 3] for "rgb_array", a drawing with agent A and goal G for "ansi"."""
         if self.render_mode != "ansi":
             return super().render()
         goal = self.goal_circle

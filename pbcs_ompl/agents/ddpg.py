@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents.ddpg_kernel import Constants, Stack, update_many, update_one
 from pbcs_ompl.agents.networks import MLP
 from pbcs_ompl.agents.presets import make_settings, preset
 from pbcs_ompl.agents.stacked_agent import StackedAgent
@@ -96,6 +98,17 @@ class DDPG(StackedAgent):
         rates = (self.settings.actor_learning_rate, self.settings.critic_learning_rate)
         return torch.stack([adam_rates(rate, first, count, self.device) for rate in rates], dim=1)
 
+    def _run_updates(self, rows: Tensor, rates: Tensor) -> dict[str, np.ndarray]:
+        if self._compile != "auto" or self.device.type != "cpu" or self.settings.layer_norm:
+            return super()._run_updates(rows, rates)
+        losses = np.empty((*rows.shape[:2], 2), dtype=np.float32)
+        constants = Constants(self._half.numpy(), self._centre.numpy(), np.float32(self.settings.discount),
+                              np.float32(1.0 - self.settings.polyak))
+        run = update_one if len(self.seeds) == 1 or torch.get_num_threads() == 1 else update_many
+        run(rows.numpy(), rates.numpy(), _stack(self._actor, len(self.seeds)),
+            _stack(self._critic, len(self.seeds)), constants, losses)
+        return {"critic_loss": losses[..., 0].astype(np.float64), "actor_loss": losses[..., 1].astype(np.float64)}
+
     def _update(self, rows: Tensor, rates: Tensor) -> dict[str, Tensor]:
         actor_rate, critic_rate = rates.unbind()
         critic_loss = self._critic_gradient(rows)
@@ -139,3 +152,8 @@ class DDPG(StackedAgent):
         with torch.inference_mode():
             values, _ = self._critic.network.forward(self._critic.weights, pairs)
             return values.squeeze(2).double().cpu().numpy()
+
+
+def _stack(network: TrainedNetwork, seeds: int) -> Stack:
+    arrays = (tensor.numpy() for tensor in network.tensors().values())
+    return Stack(network.network.sizes, seeds, *arrays)

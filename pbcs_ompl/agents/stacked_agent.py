@@ -154,10 +154,7 @@ class StackedAgent(ABC):
 
     def _train_chunk(self, count: int) -> dict[str, np.ndarray]:
         rows = self._replay.sample(count, self._shared.batch_size)
-        rates = self._rates(self.num_updates + 1, count)
-        steps = [self._run_update(*inputs) for inputs in zip(rows.unbind(), rates.unbind(), strict=True)]
-        losses = {name: torch.stack([step[name] for step in steps]).double().cpu().numpy()
-                  for name in steps[0]}
+        losses = self._run_updates(rows, self._rates(self.num_updates + 1, count))
         for name, values in losses.items():
             if not np.isfinite(values).all():
                 update, seed = np.argwhere(~np.isfinite(values))[0]
@@ -166,6 +163,11 @@ class StackedAgent(ABC):
                     f"{self.num_updates + update + 1}; try a smaller learning rate or smaller rewards")
         self.num_updates += count
         return losses
+
+    def _run_updates(self, rows: Tensor, rates: Tensor) -> dict[str, np.ndarray]:
+        """Make one update for each of rows [K, S, B, W] and rates [K, ...]; return the losses [K, S] by name."""
+        steps = [self._run_update(*inputs) for inputs in zip(rows.unbind(), rates.unbind(), strict=True)]
+        return {name: torch.stack([step[name] for step in steps]).double().cpu().numpy() for name in steps[0]}
 
     def policy(self, seed_index: int = 0) -> Policy:
         """Return a copy of one seed's actor that no longer changes."""

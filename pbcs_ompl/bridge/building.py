@@ -58,8 +58,8 @@ def _recipe(name: str, source: Any) -> Recipe:
         return source.build
     if inspect.isclass(source) and issubclass(source, ob.Planner):
         return source
-    raise InvalidOption(f"{name!r} is no planner: expected a registered name, module:attribute, a subclass of "
-                        "ompl.base.Planner, or an object with build(si, *, seed, **options)")
+    raise InvalidOption(f"{name!r} is no planner: expected a registered name, module:attribute, a subclass "
+                        "of ompl.base.Planner, or something with build(si, *, seed, **options)")
 
 
 def _name_of(source: Any) -> str:

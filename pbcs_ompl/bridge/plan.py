@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import gymnasium
 from ompl import base as ob
@@ -13,7 +13,7 @@ from pbcs_ompl.bridge.building import PlannerSpec
 from pbcs_ompl.bridge.path import to_trajectory
 from pbcs_ompl.bridge.problem import Problem, make_problem, quiet_ompl
 from pbcs_ompl.bridge.result import PlanResult
-from pbcs_ompl.bridge.stopping import interruptible, make_stop
+from pbcs_ompl.bridge.stopping import Limits, checked_limits, interruptible, make_stop
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.bridge.tree import TreeArrays, tree_of
 from pbcs_ompl.bridge.versions import planning_versions
@@ -32,14 +32,8 @@ TREE = "tree.npz"
 class HoldsError(Protocol):
     """A planner that keeps an exception of its strategy instead of raising it through OMPL."""
 
-    error: BaseException | None
-
-
-class Limits(NamedTuple):
-    """How long a planner may search."""
-
-    max_transitions: int
-    max_seconds: float | None
+    @property
+    def error(self) -> Any: ...
 
 
 def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
@@ -70,7 +64,7 @@ def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
         CallbackFailed: the environment or the strategy raised, or returned NaN.
         RunFolderError: `out` exists, is in use, or cannot be written.
     """
-    limits = _checked_limits(max_transitions, max_seconds)
+    limits = checked_limits(max_transitions, max_seconds)
     model = _open(env, env_kwargs)
     spec = PlannerSpec(planner, planner_kwargs or {})
     with _new_folder(out) as folder:
@@ -107,7 +101,7 @@ def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
         except Exception as error:
             raise failure(error) from error
         seconds = time.perf_counter() - began
-    if isinstance(planner, HoldsError) and planner.error is not None:
+    if isinstance(planner, HoldsError) and isinstance(planner.error, BaseException):
         watch.fail(planner.error)
     watch.raise_error()
     tree = tree_of(planner, model, problem.space_information)
@@ -136,14 +130,6 @@ def _fresh(model: ResetAnywhere) -> ResetAnywhere:
     """Return a new environment of the same kind; the same one when nobody can build another."""
     load_environments()
     return make(model.env_id, model.env_kwargs) if model.env_id in gymnasium.registry else model
-
-
-def _checked_limits(max_transitions: int, max_seconds: float | None) -> Limits:
-    if max_transitions <= 0:
-        raise InvalidOption(f"max_transitions is {max_transitions}; expected at least 1")
-    if max_seconds is not None and not max_seconds > 0:
-        raise InvalidOption(f"max_seconds is {max_seconds}; expected more than 0")
-    return Limits(max_transitions, max_seconds)
 
 
 @contextmanager

@@ -5,12 +5,33 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 from pbcs_ompl.bridge.watch import Watch
 from pbcs_ompl.core.contracts import ProgressCallback
+from pbcs_ompl.core.errors import InvalidOption
 
 SECONDS_BETWEEN_REPORTS = 0.25
+
+
+class Limits(NamedTuple):
+    """How long a planner may search."""
+
+    max_transitions: int
+    max_seconds: float | None
+
+
+def checked_limits(max_transitions: int, max_seconds: float | None) -> Limits:
+    """Return the limits.
+
+    Raises:
+        InvalidOption: one of them is not above 0.
+    """
+    if max_transitions <= 0:
+        raise InvalidOption(f"max_transitions is {max_transitions}; expected at least 1")
+    if max_seconds is not None and not max_seconds > 0:
+        raise InvalidOption(f"max_seconds is {max_seconds}; expected more than 0")
+    return Limits(max_transitions, max_seconds)
 
 
 def make_stop(watch: Watch, max_seconds: float | None,

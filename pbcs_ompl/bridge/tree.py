@@ -13,6 +13,7 @@ from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.run_folder import read_arrays, write_arrays
 
 
+@runtime_checkable
 class Tree(Protocol):
     """The arrays of a tree: states [N, D], parents [N] and controls [N, A]."""
 
@@ -26,10 +27,10 @@ class Tree(Protocol):
 
 @runtime_checkable
 class HoldsTree(Protocol):
-    """A planner that keeps its tree as arrays."""
+    """A planner that keeps its tree, perhaps as arrays."""
 
     @property
-    def tree(self) -> Tree | None: ...
+    def tree(self) -> Any: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +71,7 @@ def tree_of(planner: Any, model: ResetAnywhere, space_information: Any) -> TreeA
 
     PlannerData carry no controls in the installed OMPL, and KPIECE1 keeps only some of the states it visited.
     """
-    if isinstance(planner, HoldsTree) and planner.tree is not None:
-        tree = planner.tree
+    if isinstance(planner, HoldsTree) and isinstance(tree := planner.tree, Tree):
         parents = np.array(tree.parents, dtype=np.int64)
         return TreeArrays(np.array(tree.states), parents, np.array(tree.controls))
     data = ob.PlannerData(space_information)

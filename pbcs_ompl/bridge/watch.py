@@ -3,7 +3,7 @@
 from math import isfinite
 
 from pbcs_ompl.core.contracts import Counter
-from pbcs_ompl.core.errors import CallbackFailed
+from pbcs_ompl.core.errors import CallbackFailed, PbcsError
 
 
 class Watch:
@@ -41,12 +41,12 @@ class Watch:
         """Raise what a callback raised, if any did.
 
         Raises:
-            CallbackFailed: a callback raised; the exception is chained.
+            CallbackFailed: a callback raised; the exception is chained. Our own errors are raised as such.
             KeyboardInterrupt: the user interrupted inside a callback.
         """
         if self.error is None:
             return
-        if isinstance(self.error, CallbackFailed) or not isinstance(self.error, Exception):
+        if isinstance(self.error, PbcsError) or not isinstance(self.error, Exception):
             raise self.error
         raise failure(self.error) from self.error
 

@@ -15,6 +15,8 @@ from pbcs_ompl.core.errors import PbcsError
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status. Every mistake of the user ends in one line on stderr."""
     words = list(sys.argv[1:] if argv is None else argv)
+    if "" not in sys.path:
+        sys.path.append("")  # `--planner my_module:MyPlanner` finds a module in the working directory
     try:
         arguments = parse(build_parser(), words)
         return int(import_module(f"pbcs_ompl.cli.{arguments.verb}").run(arguments))

@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 from pbcs_ompl.cli.values import choice, fraction, integer, json_object, seconds
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
-METHODS = ("pbcs", "pb", "backplay", "bootstrapped", "offline", "plain")
+METHODS = ("pbcs", "pb", "backplay", "plain")
 PRESETS = ("fast", "thesis")
 DESCRIPTION = """\
 Plan with OMPL in any environment that can be reset anywhere,
@@ -32,7 +32,7 @@ class Parser(argparse.ArgumentParser):
         settings.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
         super().__init__(allow_abbrev=False, **settings)
 
-    def add_argument(self, *names: str, **settings: Any) -> argparse.Action:  # type: ignore[override]
+    def add_argument(self, *names: str, **settings: Any) -> argparse.Action:
         self.options += [name for name in names if name.startswith("-")]
         return super().add_argument(*names, **settings)
 
@@ -106,7 +106,7 @@ def _plan(verb: Parser) -> None:
     verb.add_argument("--planner-kwargs", type=json_object, default={}, metavar="JSON",
                       help="options of the planner")
     _add_seed(verb)
-    _add_budget(verb)
+    _add_budget(verb, 1_000_000)
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop after this much wall time")
     _add_out(verb)
 
@@ -122,7 +122,8 @@ def _train(verb: Parser) -> None:
     verb.add_argument("--path", metavar="DIR",
                       help="train along this plan, a folder of pbcs plan or a trajectory")
     _add_seed(verb)
-    _add_budget(verb)
+    verb.add_argument("--max-transitions", type=integer(1), metavar="N",
+                      help="stop after so many environment steps (10,000,000)")
     _add_out(verb)
     verb.add_argument("--resume", metavar="DIR", help="go on with a training run that was stopped")
 
@@ -141,7 +142,7 @@ def _compare(verb: Parser) -> None:
                       help="registered planners or module:Class")
     _add_environment(verb)
     verb.add_argument("--seeds", type=integer(1), default=10, metavar="N", help="seeds of each planner (10)")
-    _add_budget(verb)
+    _add_budget(verb, 1_000_000)
     verb.add_argument("--jobs", type=integer(1), metavar="J", help="processes that run side by side")
     _add_out(verb)
 
@@ -156,9 +157,9 @@ def _add_seed(verb: Parser) -> None:
     verb.add_argument("--seed", type=integer(0), default=0, metavar="N", help="seed of everything random (0)")
 
 
-def _add_budget(verb: Parser) -> None:
-    verb.add_argument("--max-transitions", type=integer(1), metavar="N",
-                      help="stop after so many environment steps")
+def _add_budget(verb: Parser, default: int) -> None:
+    verb.add_argument("--max-transitions", type=integer(1), default=default, metavar="N",
+                      help=f"stop after so many environment steps ({default:,})")
 
 
 def _add_out(verb: Parser) -> None:

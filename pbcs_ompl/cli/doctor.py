@@ -3,12 +3,13 @@
 import os
 import shutil
 from argparse import Namespace
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from platform import platform, python_version
 from typing import Any
 
 from pbcs_ompl.cli.terminal import conclude
-from pbcs_ompl.core.errors import PlannerUnavailable
+from pbcs_ompl.core.errors import MissingDependency, PlannerUnavailable
 from pbcs_ompl.core.registry import load, load_environments, names
 
 NEEDED = ("pbcs-ompl", "ompl", "gymnasium", "numpy", "scipy", "numba", "python-fcl", "matplotlib", "rich")
@@ -16,7 +17,7 @@ OPTIONAL = ("torch", "safetensors", "mujoco", "gymnasium-robotics", "stable-base
 
 
 def run(arguments: Namespace) -> int:
-    """Look at everything, change nothing. Returns 3 when a needed library is missing."""
+    """Look, change nothing. Returns 3 when a needed library is missing, 1 when the environment fails."""
     versions = {"python": python_version(), **{name: _version(name) for name in NEEDED + OPTIONAL}}
     missing = [name for name in NEEDED if versions[name] is None]
     result: dict[str, Any] = {
@@ -26,7 +27,9 @@ def run(arguments: Namespace) -> int:
         "environment": _check(arguments) if arguments.env else None,
     }
     conclude(result, _closing_lines(result), as_json=arguments.json)
-    return 3 if missing else 0
+    if missing:
+        return 3
+    return 1 if result["environment"] and not result["environment"]["ok"] else 0
 
 
 def bad_pairs(versions: dict[str, str | None]) -> list[str]:
@@ -66,7 +69,7 @@ def _planners() -> dict[str, str]:
         try:
             load("planner", name)
             states[name] = "ready"
-        except PlannerUnavailable as error:
+        except (PlannerUnavailable, MissingDependency) as error:
             states[name] = str(error)
     return states
 
@@ -81,7 +84,8 @@ def _environments() -> list[str]:
 def _check(arguments: Namespace) -> dict[str, Any]:
     from pbcs_ompl.reset_anywhere import check_resettable, make
 
-    return dict(check_resettable(make(arguments.env, arguments.env_kwargs)).summary())
+    report = check_resettable(make(arguments.env, arguments.env_kwargs))
+    return {"env": report.env_id, "ok": report.ok, "checks": [asdict(check) for check in report.checks]}
 
 
 def _closing_lines(result: dict[str, Any]) -> list[tuple[str, str]]:
@@ -95,5 +99,8 @@ def _closing_lines(result: dict[str, Any]) -> list[tuple[str, str]]:
     lines += [("", f"{name}: {state}") for name, state in result["planners"].items() if state != "ready"]
     lines += [("agents", ", ".join(result["agents"])), ("envs", ", ".join(result["environments"]))]
     if result["environment"] is not None:
-        lines += [("reset", f"{name}: {value}") for name, value in result["environment"].items()]
+        checks = result["environment"]["checks"]
+        verdict = "can be" if result["environment"]["ok"] else "CANNOT be trusted to be"
+        lines.append(("reset", f"{result['environment']['env']} {verdict} reset anywhere"))
+        lines += [("", f"{'ok  ' if c['ok'] else 'FAIL'} {c['name']} {c['detail']}".rstrip()) for c in checks]
     return lines

@@ -8,11 +8,13 @@ from pbcs_ompl.cli.terminal import conclude, percent, short
 from pbcs_ompl.reset_anywhere import make
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.evaluation import evaluate
+from pbcs_ompl.skills.training import CHAIN
 
 
 def run(arguments: Namespace) -> int:
     """Evaluate and report. Returns 1 when no rollout reached the goal."""
-    chain = SkillChain.load(Path(arguments.dir))
+    folder = Path(arguments.dir)
+    chain = SkillChain.load(folder / CHAIN if (folder / CHAIN).is_dir() else folder)
     model = make(chain.env_id, chain.env_kwargs)
     evaluation = evaluate(chain, model, episodes=arguments.episodes, epsilon=arguments.epsilon)
     summary = evaluation.summary()

@@ -34,8 +34,8 @@ def draw_tree(model: ResetAnywhere, result: "PlanResult", out: Path) -> None:
                                          path=None if trajectory is None else trajectory.states), out)
 
 
-def draw_chain(model: ResetAnywhere, chain: "SkillChain", trajectory: Array | None, rollout: Array,
-               title: str, out: Path) -> None:
+def draw_chain(model: ResetAnywhere, chain: "SkillChain", trajectory: Array | None,
+               rollout: Array | None, title: str, out: Path) -> None:
     """Draw chain.png: phase 1, the chain's rollout and its activation sets."""
     from pbcs_ompl.figures.chain import chain_figure
 

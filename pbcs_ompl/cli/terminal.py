@@ -18,8 +18,8 @@ SECONDS_BETWEEN_LINES = 10.0
 class Report:
     """Progress of one run, shown as a live bar on a terminal and as a line now and then elsewhere.
 
-    It is called with the plain numbers of a `ProgressCallback`. The time left is what budgets leave at the
-    present rate, so it is an upper bound: a search usually ends earlier.
+    It is called with the plain numbers of a `ProgressCallback`. The time left follows from "covered", the
+    share that is done, where it is among them; else from the budgets, and a search usually ends earlier.
 
     Args:
         label: What is being done.
@@ -32,7 +32,7 @@ class Report:
                  max_seconds: float | None = None):
         self._label, self._count, self._budget, self._max_seconds = label, count, budget, max_seconds
         console = Console(stderr=True, highlight=False)
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
         self._bar = Progress(*columns, console=console, transient=True) if console.is_terminal else None
 
     def __enter__(self) -> "Report":
@@ -49,7 +49,7 @@ class Report:
     def __call__(self, numbers: dict[str, Any]) -> None:
         now = time.monotonic()
         seconds = now - self._start
-        share = self._share(float(numbers.get(self._count, 0)), seconds)
+        share = self._share(numbers, seconds)
         text = f"{self._label}: {self._describe(numbers, seconds, share)}"
         if self._bar is not None:
             total = None if share is None else 1.0
@@ -58,18 +58,22 @@ class Report:
             self._last_line = now
             print(text, file=sys.stderr, flush=True)
 
-    def _share(self, count: float, seconds: float) -> float | None:
-        shares = [count / self._budget] if self._budget else []
+    def _share(self, numbers: dict[str, Any], seconds: float) -> float | None:
+        """Return how much is done, in [0, 1], None when nobody knows."""
+        if "covered" in numbers:
+            return float(numbers["covered"])
+        shares = [numbers.get(self._count, 0) / self._budget] if self._budget else []
         shares += [seconds / self._max_seconds] if self._max_seconds else []
         return min(1.0, max(shares)) if shares else None
 
     def _describe(self, numbers: dict[str, Any], seconds: float, share: float | None) -> str:
         parts = [f"{name.replace('_', ' ')} {short(value)}" for name, value in numbers.items()
-                 if name != "seconds"]
+                 if name not in ("seconds", "covered")]
         if seconds > 0 and self._count in numbers:
             parts.append(f"{short(numbers[self._count] / seconds)} {self._count}/s")
         if share:
-            parts.append(f"at most {duration(seconds * (1 - share) / share)} left")
+            bound = f"{share:.0%} of the plan covered, about" if "covered" in numbers else "at most"
+            parts.append(f"{bound} {duration(seconds * (1 - share) / share)} left")
         return ", ".join(parts)
 
 

@@ -1,62 +1,94 @@
 """`pbcs train`: plan a trajectory, train a chain of skills along it, draw both."""
 
+import shlex
 from argparse import Namespace
 from pathlib import Path
-from typing import Any
 
 from pbcs_ompl.bridge.plan import TRAJECTORY
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.cli.arguments import build_parser
-from pbcs_ompl.cli.folders import environment_words, fresh_folder
+from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_chain
-from pbcs_ompl.cli.terminal import Report, conclude, duration, list_files, percent, short
-from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.core.run_folder import CONFIG, read_toml
+from pbcs_ompl.cli.terminal import Report, conclude, duration, list_files, percent, short, warn
+from pbcs_ompl.core.errors import InvalidOption, TrainingStalled
+from pbcs_ompl.core.run_folder import CONFIG
 from pbcs_ompl.reset_anywhere import make
-from pbcs_ompl.skills import train
+from pbcs_ompl.skills import TrainResult, resume, train
 
 
 def run(arguments: Namespace) -> int:
     """Train, draw, report. Returns 1 when the chain does not reach the goal."""
-    settings = _resumed(arguments) if arguments.resume else _new(arguments)
-    out = Path(settings["out"])
+    if arguments.resume:
+        _refuse_other_options(arguments)
+        out = Path(arguments.resume)
+    else:
+        if arguments.env is None:
+            raise InvalidOption("--env is missing (see pbcs train --help)")
+        out = Path(arguments.out or fresh_folder("train", arguments.env, arguments.method, arguments.seed))
     try:
-        with Report("train", budget=settings.get("max_transitions")) as report:
-            result = train(on_progress=report, **settings)
+        result = _train(arguments, out)
+    except TrainingStalled as error:
+        warn(str(error))
+        result = error.result
     except KeyboardInterrupt:
         if (out / CONFIG).is_file():
-            raise KeyboardInterrupt(f"go on with: pbcs train --resume {out}") from None
+            raise KeyboardInterrupt(f"go on with: pbcs train --resume {shlex.quote(str(out))}") from None
         raise
-    summary = result.summary()
-    if result.chain is not None:
-        _draw(result.chain, out, summary)
-    conclude(summary, _closing_lines(summary, out), as_json=arguments.json)
+    _draw(result, out)
+    conclude(result.summary(), _closing_lines(result, out), as_json=arguments.json)
     return 0 if result.solved else 1
 
 
-def _new(arguments: Namespace) -> dict[str, Any]:
-    """Return the settings of a new run."""
-    if arguments.env is None:
-        raise InvalidOption("--env is missing (see pbcs train --help)")
-    settings = {name: getattr(arguments, name) for name in ("env", "env_kwargs", "method", "agent", "preset",
-                                                            "seed", "max_transitions")}
-    settings["trajectory"] = None if arguments.path is None else _read_trajectory(Path(arguments.path))
-    settings["out"] = arguments.out or fresh_folder("train", arguments.env, arguments.method, arguments.seed)
-    return settings
+def _train(arguments: Namespace, out: Path) -> TrainResult:
+    budget = {} if arguments.max_transitions is None else {"max_transitions": arguments.max_transitions}
+    with Report("train", budget=arguments.max_transitions) as report:
+        if arguments.resume:
+            return resume(out, on_progress=report, **budget)
+        trajectory = None if arguments.path is None else _read_trajectory(Path(arguments.path))
+        return train(arguments.env, env_kwargs=arguments.env_kwargs, trajectory=trajectory, out=out,
+                     method=arguments.method, agent=arguments.agent, preset=arguments.preset,
+                     seed=arguments.seed, on_progress=report, **budget)
 
 
-def _resumed(arguments: Namespace) -> dict[str, Any]:
-    """Return the settings of the run that is resumed; they all come from its folder."""
+def _refuse_other_options(arguments: Namespace) -> None:
+    """A resumed run has the settings of its folder; only its budget may change."""
     defaults = vars(build_parser().parse_args(["train"]))
-    surplus = [name for name, value in vars(arguments).items()
-               if name not in ("resume", "json") and value != defaults[name]]
-    if surplus:
-        raise InvalidOption(f"--resume takes every setting from {arguments.resume}; remove "
-                            f"--{surplus[0].replace('_', '-')}")
-    folder = Path(arguments.resume)
-    config = read_toml(folder / CONFIG)
-    ...
+    for name, value in vars(arguments).items():
+        if name not in ("resume", "json", "max_transitions") and value != defaults[name]:
+            raise InvalidOption(f"--resume takes every setting but --max-transitions from "
+                                f"{arguments.resume}; remove --{name.replace('_', '-')}")
 
 
 def _read_trajectory(path: Path) -> Trajectory:
     return Trajectory.load(path / TRAJECTORY if path.is_dir() else path)
+
+
+def _draw(result: TrainResult, out: Path) -> None:
+    if result.chain is None:
+        return
+    model = make(result.chain.env_id, result.chain.env_kwargs)
+    trajectory = None if result.trajectory is None else result.trajectory.states
+    start = model.initial_state(result.seed)
+    rollout = None if result.stalled else result.chain.rollout(model, start)
+    title = (f"{model.env_id}: {len(result.chain.skills)} skills, "
+             f"{result.train_transitions:,} transitions, {result.updates:,} updates")
+    draw_chain(model, result.chain, trajectory, rollout, title, out)
+
+
+def _closing_lines(result: TrainResult, out: Path) -> list[tuple[str, str]]:
+    effort = (f"{short(result.plan_transitions)} transitions of planning, "
+              f"{short(result.train_transitions)} of training, {short(result.updates)} updates, "
+              f"{duration(result.seconds)}")
+    lines = [("solved" if result.solved else "not solved", effort)]
+    if result.chain is not None:
+        lines.append(("chain", f"{len(result.chain.skills)} skills"))
+    if result.nominal is not None and result.nominal.steps_median is not None:
+        lines.append(("rollout", f"{short(result.nominal.steps_median)} steps to the goal without noise"))
+    if result.robust is not None:
+        rate = percent(result.robust.success_rate, result.robust.wilson)
+        lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions"))
+    lines.append(("files", list_files(out)))
+    folder = shlex.quote(str(out))
+    if result.stalled is None:
+        return [*lines, ("next", f"pbcs eval {folder} --epsilon 0.2")]
+    return [*lines, ("next", f"pbcs train --resume {folder} --max-transitions N, with a larger N")]

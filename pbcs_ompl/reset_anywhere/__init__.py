@@ -1,4 +1,4 @@
-"""Environments seen as functions of states: one adapter for each family, and the check for authors of environments.
+"""Environments seen as functions of states: one adapter for each family, and a check for their authors.
 
 Example:
     >>> from pbcs_ompl.reset_anywhere import make

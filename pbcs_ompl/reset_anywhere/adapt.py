@@ -12,10 +12,10 @@ from pbcs_ompl.reset_anywhere.vectorised import VectorisedModel
 from pbcs_ompl.reset_anywhere.wrappers import unwrap
 
 HOW_TO = (
-    "implement either `get_env_state() -> array [D]` and `set_env_state(array)` beside `step` (simple), or the whole "
-    "`pbcs_ompl.core.contracts.VectorisedEnv` protocol (fast)"
+    "implement `get_env_state() -> array [D]` and `set_env_state(array)` beside `step` (simple), or the "
+    "protocol `pbcs_ompl.core.contracts.VectorisedEnv` (fast)"
 )
-MODEL_MEMBERS = sorted({*ResetAnywhere.__annotations__, *(n for n in vars(ResetAnywhere) if not n.startswith("_"))})
+MODEL_MEMBERS = {*ResetAnywhere.__annotations__, *(n for n in vars(ResetAnywhere) if not n.startswith("_"))}
 
 
 def adapt(env: Any) -> ResetAnywhere:
@@ -24,29 +24,28 @@ def adapt(env: Any) -> ResetAnywhere:
     The model works on `env.unwrapped` and moves it about: give it an environment of its own.
 
     Raises:
-        NoResetAnywhere: there is no way to restore its states, or a wrapper would be lost; says what to implement.
-        UnsupportedSpace: its action or observation space is not a finite (action) vector Box; says the remedy.
+        NoResetAnywhere: its states cannot be restored, or a wrapper would be lost; says what to implement.
+        UnsupportedSpace: its actions are no finite vector Box, or its observations no vector Box.
     """
     if not isinstance(env, gymnasium.Env):
         return _as_model(env)
     inner = unwrap(env)
     check_spaces(inner)
     if isinstance(inner, VectorisedEnv):
-        return cast(ResetAnywhere, VectorisedModel(inner))
+        return VectorisedModel(inner)
     if offers_get_set_state(inner):
-        return cast(ResetAnywhere, GetSetStateModel(inner))
+        return GetSetStateModel(inner)
     raise NoResetAnywhere(f"{_name(inner)} cannot be reset anywhere: {HOW_TO}")
 
 
 def _as_model(model: Any) -> ResetAnywhere:
-    missing = [name for name in MODEL_MEMBERS if not hasattr(model, name)]
+    missing = sorted(name for name in MODEL_MEMBERS if not hasattr(model, name))
+    if isinstance(model, str):
+        raise NoResetAnywhere(f"expected a gymnasium.Env, got the string {model!r}; call make({model!r})")
     if len(missing) == len(MODEL_MEMBERS):
-        raise NoResetAnywhere(
-            f"expected a gymnasium.Env or a ResetAnywhere, got {type(model).__name__}"
-            + ("; to make an environment by id call pbcs_ompl.reset_anywhere.make" if isinstance(model, str) else "")
-        )
+        raise NoResetAnywhere(f"expected a gymnasium.Env or a ResetAnywhere, got {type(model).__name__}")
     if missing:
-        raise NoResetAnywhere(f"{type(model).__name__} is no complete ResetAnywhere: it lacks {', '.join(missing)}")
+        raise NoResetAnywhere(f"{type(model).__name__} is no ResetAnywhere; it lacks {', '.join(missing)}")
     return cast(ResetAnywhere, model)
 
 

@@ -19,7 +19,7 @@ def uniform_in_ball(centre: Array, radius: float, count: int, rng: np.random.Gen
 
 def valid_in_ball(centre: Array, radius: float, count: int, rng: np.random.Generator,
                   is_valid: Callable[[Array], BoolArray] | None) -> Array:
-    """Return `count` points [count, D], uniform in the valid part of the ball; None for `is_valid` accepts all.
+    """Return `count` points [count, D], uniform in the valid part of the ball, or in all of it.
 
     Raises:
         InvalidOption: the radius is negative or not finite.
@@ -38,5 +38,5 @@ def valid_in_ball(centre: Array, radius: float, count: int, rng: np.random.Gener
         points[bad] = uniform_in_ball(centre, radius, len(bad), rng)
         bad = bad[~is_valid(points[bad])]
     if len(bad):
-        raise InvalidState(f"found no valid state within {radius:g} of {centre.tolist()} in {MAX_ROUNDS} draws")
+        raise InvalidState(f"no valid state within {radius:g} of {centre.tolist()} in {MAX_ROUNDS} draws")
     return points

@@ -1,4 +1,4 @@
-"""Does an environment keep what reset-anywhere promises? For authors of environments, beside Gymnasium's `check_env`."""
+"""Does an environment keep what reset-anywhere promises? A companion of Gymnasium's `check_env`."""
 
 from collections.abc import Callable
 from copy import deepcopy
@@ -23,6 +23,9 @@ class Check:
     ok: bool
     detail: str = ""
 
+    def __str__(self) -> str:
+        return f"  {'ok  ' if self.ok else 'FAIL'}  {self.name}{': ' if self.detail else ''}{self.detail}"
+
 
 @dataclass(frozen=True)
 class ResetReport:
@@ -37,9 +40,8 @@ class ResetReport:
         return all(check.ok for check in self.checks)
 
     def __str__(self) -> str:
-        title = f"{self.env_id}: {'can be reset anywhere' if self.ok else 'cannot be trusted to be reset anywhere'}"
-        lines = [f"  {'ok  ' if c.ok else 'FAIL'}  {c.name}{': ' + c.detail if c.detail else ''}" for c in self.checks]
-        return "\n".join([title, *lines])
+        verdict = "can be reset anywhere" if self.ok else "cannot be trusted to be reset anywhere"
+        return "\n".join([f"{self.env_id}: {verdict}", *map(str, self.checks)])
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,10 @@ def check_resettable(env: Any, *, seed: int = 0) -> ResetReport:
         return ResetReport(type(env).__name__, (Check("has an adapter", False, str(error)),))
     except Exception as error:  # an author's mistake is a finding, not a crash
         return ResetReport(type(env).__name__, (Check("has an adapter", False, _describe(error)),))
-    trial = _Trial(model, seed)
+    try:
+        trial = _Trial(model, seed)
+    except Exception as error:  # as above
+        return ResetReport(model.env_id, (Check("can be stepped", False, _describe(error)),))
     tests = [
         ("a restored state continues as before", trial.restored),
         ("so it does after other steps and another reset", trial.disturbed),

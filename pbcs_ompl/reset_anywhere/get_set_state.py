@@ -19,28 +19,29 @@ def offers_get_set_state(env: gymnasium.Env[Any, Any]) -> bool:
 class GetSetStateModel(Model):
     """Any environment that can save and restore its state as a vector; batches are loops over `step`.
 
-    Beside the attributes that `Model` reads, the environment may offer: `state_low` and `state_high` (it then promises
-    to restore any valid vector within them; without them the bounds of the observation space serve, if the state is
-    the observation), `observe(states)` (needed unless the state is the observation), `is_valid(states)`
-    (default: within the bounds), `goal_distance(states)` with `goal_threshold`.
+    Beside the attributes that `Model` reads, the environment may offer:
 
-    Without `goal_distance` a success is what `info["is_success"]` or `info["success"]` says, else `terminated`; the
-    distance to the goal is then 0 for states in which a step of this model succeeded, and 1 for all others.
+    * `state_low`, `state_high`: it then promises to restore any valid vector within them. Without them the
+      bounds of the observation space serve, if the state is the observation.
+    * `observe(states)`: needed unless the state is the observation.
+    * `is_valid(states)`: by default whatever is within the bounds.
+    * `goal_distance(states)` and `goal_threshold`. Without them a success is what `info["is_success"]` or
+      `info["success"]` says, else `terminated`; the distance to the goal is then 0 for the states in which a
+      step of this model succeeded, and 1 for all others.
 
     Raises:
         NoResetAnywhere: the state is no vector, or bounds or observations are missing.
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any]):
-        self._raw: Any = env
+    def __init__(self, env: Any):
         observation, _ = env.reset(seed=0)
-        state = _as_vector(env, self._raw.get_env_state())
+        state = _as_vector(env, env.get_env_state())
         is_observation = np.shape(observation) == state.shape and bool(np.array_equal(state, observation))
         low, high, declared = _state_bounds(env, state, is_observation)
         super().__init__(env, low, high)
         if len(self.state_low) != len(state):
-            raise NoResetAnywhere(f"{self.env_id}: state_low has {len(self.state_low)} dimensions, the state "
-                                  f"{len(state)}")
+            raise NoResetAnywhere(f"{self.env_id}: state_low has {len(self.state_low)} dimensions, "
+                                  f"the state has {len(state)}")
         arbitrary: set[Capability] = {"arbitrary"} if declared else set()
         self.capabilities: frozenset[Capability] = frozenset({"visited", "exact", *arbitrary})
         self._observe: Callable[[Array], Array] | None = getattr(env, "observe", None)
@@ -50,14 +51,14 @@ class GetSetStateModel(Model):
         self._goal_distance: Callable[[Array], Array] | None = getattr(env, "goal_distance", None)
         if self._goal_distance is not None and not hasattr(env, "goal_threshold"):
             raise NoResetAnywhere(f"{self.env_id}: it has `goal_distance` but no `goal_threshold`; set both")
-        self.goal_threshold = 0.5 if self._goal_distance is None else float(self._raw.goal_threshold)
+        self.goal_threshold = 0.5 if self._goal_distance is None else float(env.goal_threshold)
         self._is_valid: Callable[[Array], BoolArray] | None = getattr(env, "is_valid", None)
         self._reached: set[bytes] = set()
 
     def initial_state(self, seed: int | None = None) -> Array:
         """Return the state [D] after `env.reset(seed=seed)`."""
         self.env.reset(seed=seed)
-        return _as_vector(self.env, self._raw.get_env_state())
+        return _as_vector(self.env, self.env.get_env_state())
 
     def transition(self, states: Array, controls: Array) -> Transition:
         """Advance states [B, D] by one step under controls [B, A], one after the other.
@@ -85,7 +86,7 @@ class GetSetStateModel(Model):
         return np.array(states, dtype=np.float64) if self._observe is None else self._observe(states)
 
     def goal_distance(self, states: Array) -> Array:
-        """Return the distances [B] of states [B, D] to the goal; see the class for environments that have none."""
+        """Return the distances [B] of states [B, D] to the goal; 0 or 1 where the environment has none."""
         states = np.asarray(states, dtype=np.float64)
         if self._goal_distance is not None:
             return np.asarray(self._goal_distance(states), dtype=np.float64)
@@ -99,10 +100,10 @@ class GetSetStateModel(Model):
         return valid
 
     def _step(self, state: Array, control: Array) -> tuple[Array, float, bool, bool]:
-        self._raw.set_env_state(state.copy())
+        self.env.set_env_state(state.copy())
         _, reward, terminated, _, info = self.env.step(control.astype(self.env.action_space.dtype))
         success = info.get("is_success", info.get("success", terminated))
-        return _as_vector(self.env, self._raw.get_env_state()), float(reward), bool(terminated), bool(success)
+        return _as_vector(self.env, self.env.get_env_state()), float(reward), bool(terminated), bool(success)
 
     def _successes(self, after: Array, flags: list[bool]) -> BoolArray:
         if self._goal_distance is None:
@@ -110,22 +111,22 @@ class GetSetStateModel(Model):
         return self.goal_distance(after) < self.goal_threshold
 
 
-def _as_vector(env: gymnasium.Env[Any, Any], state: Any) -> Array:
+def _as_vector(env: Any, state: Any) -> Array:
     if not isinstance(state, np.ndarray | list | tuple) or np.ndim(state) != 1:
-        raise NoResetAnywhere(f"{type(env).__name__}.get_env_state() returned {type(state).__name__}; expected a "
-                              f"vector of numbers")
+        raise NoResetAnywhere(f"{type(env).__name__}.get_env_state() returned a {type(state).__name__}; "
+                              f"expected a vector of numbers")
     return np.array(state, dtype=np.float64)
 
 
-def _state_bounds(env: gymnasium.Env[Any, Any], state: Array, is_observation: bool) -> tuple[Array, Array, bool]:
+def _state_bounds(env: Any, state: Array, is_observation: bool) -> tuple[Array, Array, bool]:
     """Return the bounds of the state, and whether the environment declared them itself."""
     if hasattr(env, "state_low") and hasattr(env, "state_high"):
         return env.state_low, env.state_high, True
-    box: Any = env.observation_space
+    box = env.observation_space
     if is_observation and np.isfinite(box.low).all() and np.isfinite(box.high).all():
         return box.low, box.high, False
-    raise NoResetAnywhere(f"{type(env).__name__}: the bounds of its {len(state)} state dimensions are unknown; set "
-                          f"`state_low` and `state_high`")
+    raise NoResetAnywhere(f"{type(env).__name__}: the bounds of its {len(state)} state dimensions are "
+                          f"unknown; set `state_low` and `state_high`")
 
 
 def _as_batch(name: str, values: Array, size: int, error: type[InvalidState] | type[InvalidOption]) -> Array:

@@ -1,6 +1,7 @@
 """Make an environment by id, with errors that name the closest id or option."""
 
 import inspect
+from importlib import import_module
 from typing import Any
 
 import gymnasium
@@ -16,8 +17,8 @@ def make(env_id: str, env_kwargs: dict[str, Any] | None = None) -> ResetAnywhere
     """Make the environment `env_id` and return it as a `ResetAnywhere`.
 
     Args:
-        env_id: An id known to Gymnasium, such as "pbcs/Maze-v0"; packages that announce environments through the
-            entry point group `pbcs_ompl.envs` are imported first. "module:id" imports `module` before.
+        env_id: An id known to Gymnasium, such as "pbcs/Maze-v0". Packages that announce environments through
+            the entry point group `pbcs_ompl.envs` are imported first; "module:id" imports `module` too.
         env_kwargs: Options of the environment.
 
     Raises:
@@ -28,29 +29,41 @@ def make(env_id: str, env_kwargs: dict[str, Any] | None = None) -> ResetAnywhere
     """
     load_environments()
     kwargs = dict(env_kwargs or {})
-    try:
-        spec = gymnasium.spec(env_id)
-    except ModuleNotFoundError as error:
-        raise MissingDependency(f"environment {env_id!r}: there is no module {error.name!r}") from error
-    except gymnasium.error.Error as error:
-        raise UnknownName("environment", env_id, _choices(env_id)) from error
+    spec = _find(env_id)
     try:
         _check_options(spec, kwargs)
         env = gymnasium.make(env_id, **kwargs)
     except (gymnasium.error.DependencyNotInstalled, ModuleNotFoundError) as error:
-        raise MissingDependency(f"environment {env_id!r} needs something that is not installed: {error}") from error
-    return adapt(env)
+        raise MissingDependency(f"environment {env_id!r} needs what is not installed: {error}") from error
+    model = adapt(env)
+    model.env_id = env_id  # with its module, if it names one
+    return model
+
+
+def _find(env_id: str) -> EnvSpec:
+    module, _, name = env_id.rpartition(":")
+    try:
+        if module:
+            import_module(module)
+        return gymnasium.spec(name)
+    except ModuleNotFoundError as error:
+        raise MissingDependency(f"environment {env_id!r}: there is no module {error.name!r}") from error
+    except gymnasium.error.Error as error:
+        raise UnknownName("environment", env_id, _choices(name)) from error
 
 
 def _choices(env_id: str) -> list[str]:
     """Return all ids if one is close to `env_id`, else those of plug-ins only: the list would be long."""
     ids = list(gymnasium.registry)
-    return ids if "did you mean" in did_you_mean(env_id, ids) else [known for known in ids if known.startswith("pbcs/")]
+    close = "did you mean" in did_you_mean(env_id, ids)
+    return ids if close else [known for known in ids if known.startswith("pbcs/")]
 
 
 def _check_options(spec: EnvSpec, kwargs: dict[str, Any]) -> None:
     """Refuse options that the environment's constructor does not take."""
-    creator = load_env_creator(spec.entry_point) if isinstance(spec.entry_point, str) else spec.entry_point
+    creator: Any = spec.entry_point
+    if isinstance(creator, str):
+        creator = load_env_creator(creator)
     parameters = inspect.signature(creator).parameters
     if any(p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters.values()):
         return

@@ -2,10 +2,9 @@
 
 from typing import Any
 
-import gymnasium
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption, NoResetAnywhere
 from pbcs_ompl.reset_anywhere.ball import valid_in_ball
 
@@ -15,37 +14,36 @@ DEFAULT_EPISODE_STEPS = 1000
 class Model:
     """The half of a `ResetAnywhere` that does not depend on how states are restored.
 
-    Reads the optional attributes of an environment: `feature_dims` (default: all dimensions), `bin_size` (extent / 20),
-    `walls` (none), `goal_circle` (none), `max_episode_steps` (that of its spec, else 1000), `advance_towards` (none).
+    Reads the optional attributes of an environment: `feature_dims` (default: all dimensions), `bin_size`
+    (extent / 20), `walls` (none), `goal_circle` (none), `max_episode_steps` (that of its spec, else 1000),
+    `advance_towards` (none).
 
     Args:
-        env: The environment without wrappers. One that was not made by `gymnasium.make` has no id; its class's name
-            stands in, and it cannot be made again from it.
+        env: The environment without wrappers. One that was not made by `gymnasium.make` has no id; its
+            class's name stands in, from which it cannot be made again.
         state_low, state_high: Finite bounds of the state [D].
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any], state_low: Array, state_high: Array):
+    def __init__(self, env: Any, state_low: Array, state_high: Array):
         self.env = env
         spec = env.spec
         self.env_id = type(env).__qualname__ if spec is None else spec.id
         self.env_kwargs: dict[str, Any] = {} if spec is None else dict(spec.kwargs)
         self.env_kwargs.pop("render_mode", None)
         self.state_low, self.state_high = _bounds(env, state_low, state_high)
-        box: Any = env.action_space
-        self.action_low, self.action_high = box.low.astype(np.float64), box.high.astype(np.float64)
+        self.action_low = env.action_space.low.astype(np.float64)
+        self.action_high = env.action_space.high.astype(np.float64)
         size = len(self.state_low)
-        dims = getattr(env, "feature_dims", None)
-        self.feature_dims: tuple[int, ...] | None = tuple(range(size)) if dims is None else tuple(map(int, dims))
-        self._dims = list(self.feature_dims)
+        self._dims = [int(d) for d in getattr(env, "feature_dims", range(size))]
+        self.feature_dims: tuple[int, ...] | None = tuple(self._dims)
         if not self._dims or not all(0 <= d < size for d in self._dims):
-            raise NoResetAnywhere(f"{self.env_id}: feature_dims={self.feature_dims} of a state with {size} dimensions")
+            raise NoResetAnywhere(f"{self.env_id}: feature_dims={self._dims}, but the state has {size}")
         self.feature_low, self.feature_high = self.state_low[self._dims], self.state_high[self._dims]
         extent = self.feature_high - self.feature_low
         self.bin_size = np.asarray(getattr(env, "bin_size", extent / 20.0), dtype=np.float64)
-        shape: Any = env.observation_space.shape
-        self.observation_size = int(shape[0])
-        limit = None if spec is None else spec.max_episode_steps
-        self.max_episode_steps = int(getattr(env, "max_episode_steps", None) or limit or DEFAULT_EPISODE_STEPS)
+        self.observation_size = int(env.observation_space.shape[0])
+        limit = (None if spec is None else spec.max_episode_steps) or DEFAULT_EPISODE_STEPS
+        self.max_episode_steps = int(getattr(env, "max_episode_steps", limit))
         self.walls = np.asarray(getattr(env, "walls", np.empty((0, 4))), dtype=np.float64)
         self.goal_circle: tuple[float, float, float] | None = getattr(env, "goal_circle", None)
         self._steer = getattr(env, "advance_towards", None)
@@ -68,10 +66,10 @@ class Model:
         """
         return valid_in_ball(state, radius, count, rng, self.is_valid if reject_invalid else None)
 
-    def is_valid(self, states: Array) -> Any:
+    def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, D] are finite and within the bounds [B]."""
         states = np.asarray(states, dtype=np.float64)
-        return ((states >= self.state_low) & (states <= self.state_high)).all(axis=1)
+        return np.logical_and.reduce((states >= self.state_low) & (states <= self.state_high), axis=1)
 
     def advance_towards(self, states: Array, targets: Array) -> Array:
         """Return controls [B, A] that lead from states [B, D] towards targets [B, F].
@@ -80,14 +78,14 @@ class Model:
             InvalidOption: the environment offers no steering.
         """
         if self._steer is None:
-            raise InvalidOption(f"{self.env_id} offers no steering: it has no `advance_towards(states, targets)`; "
-                                f"choose a planner that does not steer")
+            raise InvalidOption(f"{self.env_id} cannot be steered: it has no `advance_towards(states, "
+                                f"targets)`; choose another planner")
         return self._steer(states, targets)
 
 
-def _bounds(env: gymnasium.Env[Any, Any], low: Array, high: Array) -> tuple[Array, Array]:
+def _bounds(env: Any, low: Array, high: Array) -> tuple[Array, Array]:
     low, high = np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
-    if low.ndim != 1 or low.shape != high.shape or not (np.isfinite(low) & np.isfinite(high) & (low < high)).all():
-        raise NoResetAnywhere(f"{type(env).__name__}: state_low and state_high must be finite vectors of equal length "
-                              f"with state_low < state_high, got {low.tolist()} and {high.tolist()}")
-    return low, high
+    if low.ndim == 1 and low.shape == high.shape and np.isfinite(high - low).all() and (low < high).all():
+        return low, high
+    raise NoResetAnywhere(f"{type(env).__name__}: state_low and state_high must be finite vectors of one "
+                          f"length, low < high; got {low.tolist()} and {high.tolist()}")

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray, Capability, Transition, VectorisedEnv
+from pbcs_ompl.core.contracts import Array, BoolArray, Capability, Transition
 from pbcs_ompl.reset_anywhere.model import Model
 
 
@@ -17,21 +17,23 @@ class VectorisedModel(Model):
 
     capabilities: frozenset[Capability] = frozenset({"visited", "arbitrary", "exact"})
 
-    def __init__(self, env: VectorisedEnv | Any):
+    def __init__(self, env: Any):
         super().__init__(env, env.state_low, env.state_high)
         self.goal_threshold = float(env.goal_threshold)
         self.transition: Callable[[Array, Array], Transition] = env.transition
         self.observe: Callable[[Array], Array] = env.observe
         self.goal_distance: Callable[[Array], Array] = env.goal_distance
-        self.is_valid: Callable[[Array], BoolArray] = env.is_valid
         self.step_one: Callable[[list[float], list[float]], list[float]] = getattr(
             env, "step_one", self._step_one_by_transition)
 
     def initial_state(self, seed: int | None = None) -> Array:
         """Return the state [D] after `env.reset(seed=seed)`."""
         self.env.reset(seed=seed)
-        state: Any = self.env
-        return np.array(state.get_env_state(), dtype=np.float64)
+        return np.array(self.env.get_env_state(), dtype=np.float64)
+
+    def is_valid(self, states: Array) -> BoolArray:
+        """Return which states [B, D] the environment can be in [B]."""
+        return self.env.is_valid(states)
 
     def _step_one_by_transition(self, state: list[float], control: list[float]) -> list[float]:
         return self.transition(np.array([state]), np.array([control])).states[0].tolist()

@@ -1,4 +1,4 @@
-"""Which Gymnasium wrappers may be taken off, because states, actions and observations mean the same below them."""
+"""Which wrappers may be taken off: those below which states, actions and observations mean the same."""
 
 from typing import Any
 
@@ -13,8 +13,8 @@ TRANSPARENT = frozenset({
 """Wrappers of limits, checks, records and rewards: planners and skills see the environment below them."""
 
 WITH_MEMORY = frozenset({
-    "FrameStackObservation", "NormalizeObservation", "StickyAction", "TimeAwareObservation", "DelayObservation",
-    "MaxAndSkipObservation", "RepeatAction", "AtariPreprocessing", "AddWhiteNoise",
+    "FrameStackObservation", "NormalizeObservation", "StickyAction", "TimeAwareObservation",
+    "DelayObservation", "MaxAndSkipObservation", "RepeatAction", "AtariPreprocessing", "AddWhiteNoise",
 })
 
 
@@ -28,13 +28,13 @@ def unwrap(env: gymnasium.Env) -> gymnasium.Env[Any, Any]:
         name = type(env).__name__
         if name in WITH_MEMORY:
             raise NoResetAnywhere(
-                f"the wrapper {name} has a memory or noise of its own that a restored state would not bring back; "
-                f"leave it out, or make its memory part of the environment's state"
+                f"the wrapper {name} has a memory or noise that a restored state would not bring back; leave "
+                f"it out, or make its memory part of the environment's state"
             )
         if name not in TRANSPARENT:
             raise NoResetAnywhere(
-                f"the wrapper {name} may change actions or observations, and the toolkit works below all wrappers; "
-                f"pass env.unwrapped if that is meant, or build the change into the environment"
+                f"the wrapper {name} may change actions or observations, and the toolkit works below all "
+                f"wrappers; pass env.unwrapped if that is meant, or build the change into the environment"
             )
         env = env.env
     return env

@@ -36,6 +36,10 @@ class BackplayState:
 class Backplay:
     """One skill that ends at the learner's goal, learnt in small steps that can be interrupted.
 
+    Args:
+        learner: It aims at the end of the skill already.
+        floor: The milestone at which the skill is long enough.
+
     Source: [Matheron2020] Alg. 7. Differs: index 0 is trained too; once a session succeeds, a test may end the
     training loop before alpha sessions without improvement (`stop_at_success`); the stride between start points
     doubles while tests pass and halves when they fail (`min_stride = max_stride = 1` is the thesis); a start point
@@ -43,11 +47,11 @@ class Backplay:
     anew with fresh networks.
     """
 
-    def __init__(self, learner: Learner):
+    def __init__(self, learner: Learner, floor: int = 0):
         self.learner = learner
+        self.floor = floor
         self.settings = learner.settings
-        stride = self.settings.min_stride
-        self.state = BackplayState(max(0, learner.goal_index - stride), stride)
+        self.state = BackplayState(self._first_start(), self.settings.min_stride)
         self.saved_policy: SkillPolicy | None = None
         self.done = False
 
@@ -99,12 +103,15 @@ class Backplay:
             self.done = True
         elif not self.settings.keep_partial:
             self.learner.restart()
-            state.start = max(0, self.learner.goal_index - self.settings.min_stride)
+            state.start = self._first_start()
             self._train_from_here()
-        elif success == 0.0 or (state.start == 0 and self.saved_policy is None):
+        elif success == 0.0 or (state.start == self.floor and self.saved_policy is None):
             self._train_from_here()
         else:
             self._move_on()
+
+    def _first_start(self) -> int:
+        return max(self.floor, self.learner.goal_index - self.settings.min_stride)
 
     def _train_from_here(self) -> None:
         state = self.state
@@ -118,8 +125,8 @@ class Backplay:
 
     def _move_on(self) -> None:
         state = self.state
-        self.done = state.start == 0
-        state.start = max(0, state.start - state.stride)
+        self.done = state.start == self.floor
+        state.start = max(self.floor, state.start - state.stride)
         state.phase = "pretest"
 
     def _can_come_closer(self) -> bool:

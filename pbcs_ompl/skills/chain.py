@@ -11,10 +11,13 @@ from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
 from pbcs_ompl.core.run_folder import read_arrays, read_json, write_arrays, write_json
 from pbcs_ompl.skills.episodes import with_random_actions
 from pbcs_ompl.skills.goals import Ball, Goal, Target
+from pbcs_ompl.skills.milestones import Milestones
 from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
 
 FORMAT = "pbcs_ompl skill chain"
 VERSION = 1
+PATIENCE = 2
+"""An execution may take this many times the steps that the skills were trained for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +36,13 @@ class Rollouts:
     Attributes:
         success: Which executions reached the environment's target [B].
         steps: Steps until then, or until the time limit [B].
+        skills: The index of the skill each execution ended in [B].
         states: The states of the first execution, for pictures [T+1, D].
     """
 
     success: BoolArray
     steps: IndexArray
+    skills: IndexArray
     states: Array
 
 
@@ -57,6 +62,12 @@ class SkillChain:
     env_id: str
     env_kwargs: dict[str, Any]
     time_limit: int
+
+    @classmethod
+    def of(cls, skills: list[Skill], milestones: Milestones) -> "SkillChain":
+        """Return the chain of skills that were trained along `milestones`."""
+        model, limit = milestones.model, PATIENCE * milestones.settings.max_steps * len(skills)
+        return cls(tuple(skills), model.env_id, model.env_kwargs, limit)
 
     def check_belongs_to(self, model: ResetAnywhere) -> None:
         """Raise Mismatch when the chain was trained in another environment."""
@@ -90,7 +101,7 @@ class SkillChain:
             alive = alive[~ended]
             if not len(alive):
                 break
-        return Rollouts(success, steps, np.array(trace))
+        return Rollouts(success, steps, controller.current, np.array(trace))
 
     def rollout(self, model: ResetAnywhere, state: Array, *, epsilon: float = 0.0,
                 rng: np.random.Generator | None = None, max_steps: int | None = None) -> Array:

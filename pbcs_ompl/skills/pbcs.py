@@ -1,10 +1,25 @@
 """PBCS: a chain of skills, each learnt by Backplay, from the target back to the start; [Matheron2020] Alg. 6."""
 
+from typing import NamedTuple
+
+import numpy as np
+
 from pbcs_ompl.skills.backplay import Backplay
-from pbcs_ompl.skills.chain import Skill
+from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.learner import Learner
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.policy import SkillPolicy, policy_from_arrays, policy_to_arrays
+
+VERIFIED_RATE = 0.98
+"""Share of noisy executions that must arrive for a chain to be taken as it is."""
+
+
+class Link(NamedTuple):
+    """A skill by the milestones between which it leads."""
+
+    start: int
+    goal: int
+    policy: SkillPolicy
 
 
 class PBCS:
@@ -14,56 +29,83 @@ class PBCS:
     K, and so on until one starts at milestone 0.
 
     Source: [Matheron2020] Alg. 6. Differs: the loop ends when a skill starts at index 0 (Alg. 7 never trains index 0,
-    so that Alg. 6 would not end).
+    so that Alg. 6 would not end). With `verify_episodes`, the complete chain is executed that many times with random
+    actions, and once without; when too many executions fail, the skill in which most of them got stuck is taken out
+    and the gap is learnt anew with fresh networks.
     """
 
     def __init__(self, learner: Learner):
         self.learner = learner
-        self.bounds = [learner.milestones.last]
-        """Milestones between skills, from the target backwards."""
-        self.policies: list[SkillPolicy] = []
-        self._begin()
+        self.links: list[Link] = []
+        """From the start to the target; with a gap while one is being learnt."""
+        self.verified = not learner.settings.verify_episodes
+        self._begin(learner.milestones.last, 0)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the links lead from the start to the target without a gap."""
+        return self.goal == self.floor
 
     @property
     def done(self) -> bool:
-        """Whether the chain starts at milestone 0."""
-        return self.bounds[-1] == 0
+        """Whether the chain is complete and, if asked for, verified."""
+        return self.complete and self.verified
 
     @property
     def skills(self) -> list[Skill]:
         """The skills so far, in the order of execution."""
         milestones = self.learner.milestones
-        backwards = [Skill(policy, milestones.ball(start), milestones.goal(goal))
-                     for policy, goal, start in zip(self.policies, self.bounds, self.bounds[1:], strict=False)]
-        return backwards[::-1]
+        return [Skill(link.policy, milestones.ball(link.start), milestones.goal(link.goal)) for link in self.links]
 
     @property
     def covered(self) -> float:
         """Share of the plan that the skills so far cover."""
-        start = self.bounds[-1] if self.done or self.backplay.skill is None else self.backplay.state.saved
-        return 1.0 - start / self.learner.milestones.last
+        learnt = self.goal - self.backplay.state.saved if self.backplay.saved_policy and not self.complete else 0
+        return (sum(link.goal - link.start for link in self.links) + learnt) / self.learner.milestones.last
 
     def step(self) -> None:
-        """Do one session or one test of the present skill; store the skill when it is complete."""
+        """Do one session or one test of the present skill, or verify the complete chain."""
+        if self.complete:
+            self._verify()
+            return
         self.backplay.step()
         if self.backplay.done and self.backplay.saved_policy is not None:
-            self.policies.append(self.backplay.saved_policy)
-            self.bounds.append(self.backplay.state.saved)
-            if not self.done:
-                self._begin()
+            start = self.backplay.state.saved
+            self.links.append(Link(start, self.goal, self.backplay.saved_policy))
+            self.links.sort(key=lambda link: link.start)
+            self._begin(start, self.floor)
 
-    def _begin(self) -> None:
-        self.learner.begin(self.bounds[-1])
-        self.backplay = Backplay(self.learner)
+    def _begin(self, goal: int, floor: int) -> None:
+        """Learn the way from milestone `floor` to milestone `goal`, unless there is nothing left of it."""
+        self.goal, self.floor = goal, floor
+        if not self.complete:
+            self.learner.begin(goal)
+        self.backplay = Backplay(self.learner, floor)
+
+    def _verify(self) -> None:
+        learner = self.learner
+        chain = SkillChain.of(self.skills, learner.milestones)
+        starts = np.repeat(learner.milestones.states[:1], learner.settings.verify_episodes, axis=0)
+        nominal = chain.rollouts(learner.model, starts[:1])
+        noisy = chain.rollouts(learner.model, starts, epsilon=learner.settings.epsilon, rng=learner.rng)
+        learner.counter.count += int(nominal.steps.sum() + noisy.steps.sum())
+        self.verified = bool(nominal.success.all() and noisy.success.mean() >= VERIFIED_RATE)
+        if not self.verified:
+            stuck = nominal.skills[~nominal.success] if not nominal.success.all() else noisy.skills[~noisy.success]
+            weakest = self.links.pop(int(np.bincount(stuck).argmax()))
+            learner.restart()
+            self._begin(weakest.goal, weakest.start)
 
     def snapshot(self) -> Snapshot:
         """Return everything needed to go on bit for bit."""
         plain, arrays = self.learner.state()
-        policies = [*self.policies, *([self.backplay.saved_policy] if self.backplay.saved_policy else [])]
+        saved = self.backplay.saved_policy
+        policies = [link.policy for link in self.links] + ([saved] if saved else [])
         for index, policy in enumerate(policies):
             arrays |= {f"policy{index}.{name}": array for name, array in policy_to_arrays(policy).items()}
-        return Snapshot({"learner": plain, "bounds": self.bounds, "backplay": self.backplay.to_dict(),
-                         "policies": len(policies)}, arrays)
+        return Snapshot({"learner": plain, "links": [[link.start, link.goal] for link in self.links],
+                         "goal": self.goal, "floor": self.floor, "verified": self.verified,
+                         "backplay": self.backplay.to_dict(), "policies": len(policies)}, arrays)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from what `snapshot` returned."""
@@ -71,10 +113,11 @@ class PBCS:
         policies = [policy_from_arrays({name.partition(".")[2]: array for name, array in snapshot.arrays.items()
                                         if name.startswith(f"policy{index}.")})
                     for index in range(plain["policies"])]
-        self.bounds = list(plain["bounds"])
-        finished = len(self.bounds) - 1
-        self.policies = policies[:finished]
+        self.links = [Link(start, goal, policy)
+                      for (start, goal), policy in zip(plain["links"], policies, strict=False)]
+        self.goal, self.floor, self.verified = plain["goal"], plain["floor"], plain["verified"]
         self.learner.restore(plain["learner"], {name: array for name, array in snapshot.arrays.items()
                                                 if not name.startswith("policy")})
-        self.backplay = Backplay(self.learner)
-        self.backplay.restore(plain["backplay"], policies[finished] if len(policies) > finished else None)
+        self.backplay = Backplay(self.learner, self.floor)
+        self.backplay.restore(plain["backplay"],
+                              policies[len(self.links)] if len(policies) > len(self.links) else None)

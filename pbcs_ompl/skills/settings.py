@@ -31,6 +31,8 @@ class SkillSettings:
         min_stride, max_stride: Steps along the plan between start points; the stride doubles while tests pass.
         relative_observations: Policies see (observation - goal's observation) / ten steps' movement.
         warm_start: A new skill starts from the networks of the one before.
+        verify_episodes: Executions of the complete chain after which PBCS learns its weakest skill anew, if need be; 0
+            for none, as in the thesis.
         window: Share of the plan that one window of the original Backplay spans.
         window_sessions: Sessions the original Backplay stays in one window.
         pretest: PB tests a new start point before training there (Fig. 5.1b).
@@ -54,6 +56,7 @@ class SkillSettings:
     max_stride: int = 1
     relative_observations: bool = False
     warm_start: bool = False
+    verify_episodes: int = 0
     window: float = 0.1
     window_sessions: int = 10
     pretest: bool = True
@@ -62,6 +65,7 @@ class SkillSettings:
         for name in ("alpha", "beta", "max_steps", "episodes_together", "min_stride", "max_stride",
                      "window_sessions"):
             self._require(name, getattr(self, name) >= 1, "at least 1")
+        self._require("verify_episodes", self.verify_episodes >= 0, "at least 0")
         for name in ("epsilon", "test_epsilon", "rehearsal"):
             self._require(name, 0 <= getattr(self, name) <= 1, "within [0, 1]")
         for name in ("radius", "updates_per_transition", "window"):

@@ -29,8 +29,6 @@ CHAIN = "chain"
 CHECKPOINT_SECONDS = 30.0
 ROBUST_EPSILON = 0.1
 ROBUST_RATE = 0.95
-PATIENCE = 2
-"""An execution may take this many times the steps that the skills were trained for."""
 
 
 class Training:
@@ -136,7 +134,7 @@ class Training:
     def _finish(self, method: Method | None, trajectory: Trajectory | None, planned: int,
                 stalled: str | None) -> TrainResult:
         seconds = time.perf_counter() - self.began
-        chain = self._chain(method) if method else None
+        chain = SkillChain.of(method.skills, method.learner.milestones) if method and method.skills else None
         complete = chain is not None and stalled is None
         nominal = evaluate(chain, self.model, episodes=1, seed=self.config.seed) if chain and complete else None
         robust = evaluate(chain, self.model, epsilon=ROBUST_EPSILON, seed=self.config.seed) if nominal else None
@@ -149,11 +147,6 @@ class Training:
             out=str(self.path) if self.path else None, stalled=stalled)
         self._write(result)
         return result
-
-    def _chain(self, method: Method) -> SkillChain | None:
-        skills = tuple(method.skills)
-        limit = PATIENCE * self.settings.max_steps * len(skills)
-        return SkillChain(skills, self.model.env_id, self.model.env_kwargs, limit) if skills else None
 
     def _write(self, result: TrainResult) -> None:
         if self.folder is None:

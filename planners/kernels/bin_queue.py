@@ -17,6 +17,8 @@ SMALLEST = 2  # log2 of the rows of a new bin's slice
 CLASSES = 32  # slice sizes 2**0 .. 2**31
 START, LENGTH, SIZE = 0, 1, 2  # columns of `slices`
 BINS, POOL = 0, 1  # entries of `used`
+GROWTH = 4  # of the pool; rooms cost address space only
+FARTHEST = 4.6e18  # cells beyond this coordinate are one cell: int64 ends there
 
 
 class BinQueue(NamedTuple):
@@ -24,7 +26,7 @@ class BinQueue(NamedTuple):
 
     pool: NDArray[np.int32]
     """Node queues of all bins [R, 3]; the first row of a free slice holds the next free slice of its size, or -1."""
-    slices: NDArray[np.int64]
+    slices: NDArray[np.int32]
     """Of each bin: first row in the pool, length, log2 of the rows [M, 3]."""
     order: NDArray[np.int32]
     """The queue of the bins [M, 3]."""
@@ -39,22 +41,24 @@ class BinQueue(NamedTuple):
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays."""
-        return sum(array.nbytes for array in self)
+        """Bytes of all arrays; rooms that were never written to are not counted."""
+        bins, rows = int(self.used[BINS]), int(self.used[POOL])
+        return (self.pool[:rows].nbytes + self.slices[:bins].nbytes + self.order[:bins].nbytes
+                + self.cells[:bins].nbytes + self.table.nbytes + self.free.nbytes + self.used.nbytes)
 
 
 _integers = types.int64[:, ::1]
 _entries = types.int32[:, ::1]
-QUEUE_TYPE = types.NamedTuple((_entries, _integers, _entries, _integers, types.int32[::1], types.int32[::1],
+QUEUE_TYPE = types.NamedTuple((_entries, _entries, _entries, _integers, types.int32[::1], types.int32[::1],
                                types.int64[::1]), BinQueue)
 """Numba's type of BinQueue."""
 
 
 def empty_queue(num_features: int) -> BinQueue:
-    """Return a queue without bins."""
-    rooms = 64
+    """Return a queue without bins; its rooms cost no memory until they are written to."""
+    rooms, rows = 2048, 1 << 16
     return BinQueue(
-        pool=np.empty((rooms << SMALLEST, 3), np.int32), slices=np.empty((rooms, 3), np.int64),
+        pool=np.empty((rows, 3), np.int32), slices=np.empty((rooms, 3), np.int32),
         order=np.empty((rooms, 3), np.int32), cells=np.empty((rooms, num_features), np.int64),
         table=np.full(4 * rooms, -1, np.int32), free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64))
 
@@ -79,45 +83,53 @@ def select(queue: BinQueue, uniforms: NDArray[np.float64], nodes: NDArray[np.int
         nodes[i] = select_one(queue, uniforms[i, 0], uniforms[i, 1])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def select_one(queue: BinQueue, for_bin: float, for_node: float) -> int:
     """Return a node of the lowest count in a bin of the lowest count; raise both counts."""
     chosen = choose(queue.order, 0, queue.used[BINS], for_bin)
     return choose(queue.pool, queue.slices[chosen, START], queue.slices[chosen, LENGTH], for_node)
 
 
-@njit(cache=True)
-def insert_one(queue: BinQueue, feature: NDArray[np.float64], size: NDArray[np.float64], node: int) -> bool:
-    """Insert a node of count 0; return False, with the queue unchanged in meaning, where an array is full."""
-    cell = np.empty(len(feature), np.int64)
-    cell_of(feature, size, cell)
-    return _insert_in(queue, cell, node)
+@njit(cache=True, inline="always")
+def insert_one(queue: BinQueue, features: NDArray[np.float64], row: int, size: NDArray[np.float64], node: int,
+               cell: NDArray[np.int64]) -> bool:
+    """Insert a node of count 0 with features[row]; return False, and change nothing, where an array is full.
+
+    `cell` [F] is scratch: memory is allocated nowhere in these kernels.
+    """
+    for axis in range(len(cell)):
+        scaled = np.floor(features[row, axis] / size[axis])
+        cell[axis] = int(min(max(scaled, -FARTHEST), FARTHEST))
+    place = find_cell(queue.cells, queue.table, cell)
+    found = np.int64(queue.table[place])
+    if found < 0:
+        found = _new_bin(queue, cell, place)
+        if found < 0:
+            return False
+    length = np.int64(queue.slices[found, LENGTH])
+    if length == 1 << queue.slices[found, SIZE] and not _double(queue, found):
+        return False
+    append(queue.pool, queue.slices[found, START], length, node)
+    queue.slices[found, LENGTH] = length + 1
+    return True
 
 
 @njit(cache=True)
 def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[np.int64]) -> int:
     """Return the position in `table` of a cell [F], or of the empty place where it belongs."""
     mixed = np.uint64(0)
-    for coordinate in cell:
-        mixed = (mixed ^ np.uint64(coordinate)) * np.uint64(0x9E3779B97F4A7C15)
+    for axis in range(len(cell)):
+        mixed = (mixed ^ np.uint64(cell[axis])) * np.uint64(0x9E3779B97F4A7C15)
         mixed ^= mixed >> np.uint64(29)
     place = np.int64(mixed & np.uint64(len(table) - 1))
     while table[place] >= 0:
-        known = cells[table[place]]
         same = True
         for axis in range(len(cell)):
-            same = same and known[axis] == cell[axis]
+            same = same and cells[table[place], axis] == cell[axis]
         if same:
             return place
         place = (place + 1) & (len(table) - 1)
     return place
-
-
-@njit(cache=True)
-def cell_of(feature: NDArray[np.float64], size: NDArray[np.float64], cell: NDArray[np.int64]) -> None:
-    """Write into `cell` [F] the coordinates floor(feature / size); beyond 2**62 cells all is one cell."""
-    for axis in range(len(cell)):
-        cell[axis] = int(min(max(np.floor(feature[axis] / size[axis]), -4.6e18), 4.6e18))
 
 
 @njit(cache=True)
@@ -126,25 +138,10 @@ def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.boo
     """Insert from position `done` on; return where an array was full."""
     cell = np.empty(features.shape[1], np.int64)
     while done < len(features):
-        if not skip[done]:
-            cell_of(features[done], size, cell)
-            if not _insert_in(queue, cell, first + done):
-                return done
+        if not skip[done] and not insert_one(queue, features, done, size, first + done, cell):
+            return done
         done += 1
     return done
-
-
-@njit(cache=True)
-def _insert_in(queue: BinQueue, cell: NDArray[np.int64], node: int) -> bool:
-    place = find_cell(queue.cells, queue.table, cell)
-    found = np.int64(queue.table[place])
-    if found < 0:
-        found = _new_bin(queue, cell, place)
-    if found < 0 or not _room(queue, found):
-        return False
-    append(queue.pool, queue.slices[found, START], queue.slices[found, LENGTH], node)
-    queue.slices[found, LENGTH] += 1
-    return True
 
 
 @njit(cache=True)
@@ -156,7 +153,8 @@ def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: int) -> int:
     start = _take(queue, SMALLEST)
     if start < 0:
         return -1
-    queue.cells[number] = cell
+    for axis in range(len(cell)):
+        queue.cells[number, axis] = cell[axis]
     queue.slices[number, START] = start
     queue.slices[number, LENGTH] = 0
     queue.slices[number, SIZE] = SMALLEST
@@ -167,15 +165,16 @@ def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: int) -> int:
 
 
 @njit(cache=True)
-def _room(queue: BinQueue, number: int) -> bool:
-    """Give a full bin a slice of twice the size; return whether there was room."""
-    start, length, size = queue.slices[number]
-    if length < 1 << size:
-        return True
+def _double(queue: BinQueue, number: int) -> bool:
+    """Move a full bin to a slice of twice the size; return whether there was room."""
+    start, length = np.int64(queue.slices[number, START]), np.int64(queue.slices[number, LENGTH])
+    size = np.int64(queue.slices[number, SIZE])
     moved = _take(queue, size + 1)
     if moved < 0:
         return False
-    queue.pool[moved:moved + length] = queue.pool[start:start + length]
+    for row in range(length):
+        for column in range(3):
+            queue.pool[moved + row, column] = queue.pool[start + row, column]
     queue.pool[start, MEMBER] = queue.free[size]
     queue.free[size] = start
     queue.slices[number, START] = moved
@@ -209,7 +208,7 @@ def _grow(queue: BinQueue) -> BinQueue:
                               order=_enlarged(queue.order, bins, rooms))
     rows = int(queue.used[POOL])
     largest = 1 << (int(queue.slices[:bins, SIZE].max(initial=SMALLEST)) + 1)
-    return queue._replace(pool=_enlarged(queue.pool, rows, max(int(1.5 * len(queue.pool)), rows + largest)))
+    return queue._replace(pool=_enlarged(queue.pool, rows, max(GROWTH * len(queue.pool), rows + largest)))
 
 
 def _enlarged(array: np.ndarray, used: int, rows: int) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Ex as one compiled loop: select, draw a control, step, insert ([Matheron2020] Alg. 5, lines 7 to 12)."""
 
+import numpy as np
 from numba import njit, types
 
 from planners.compiled import STEP_TYPE
@@ -16,16 +17,16 @@ COLUMNS_TYPE = types.NamedTuple((_matrix, _matrix, _matrix, types.int32[::1], _v
 
 
 @njit(cache=True)
-def _finite(state):
+def _finite(states, row):
     total = 0.0
-    for value in state:
-        total += value - value
+    for axis in range(states.shape[1]):
+        total += states[row, axis] - states[row, axis]
     return total == 0.0
 
 
-@njit(types.UniTuple(types.int64, 2)(STEP_TYPE, _vector, _integers, _integers, _vector, _vector, COLUMNS_TYPE,
-                                     types.int64, QUEUE_TYPE, _vector, _matrix), cache=True)
-def expand(step, reals, integers, feature_dims, low, high, columns, first, queue, bin_size, uniforms):
+@njit(types.UniTuple(types.int64, 2)(STEP_TYPE, _vector, _matrix, _integers, _integers, _vector, _vector,
+                                     COLUMNS_TYPE, types.int64, QUEUE_TYPE, _vector, _matrix), cache=True)
+def expand(step, reals, table, integers, feature_dims, low, high, columns, first, queue, bin_size, uniforms):
     """Expand a node for each row of `uniforms` [B, 2 + A] (bin, node, control); write the new nodes from `first` on.
 
     Returns:
@@ -33,23 +34,23 @@ def expand(step, reals, integers, feature_dims, low, high, columns, first, queue
         it is the goal, or the queue was too small for it, or its state is not finite.
     """
     done = 0
+    cell = np.empty(len(bin_size), np.int64)
     for row in range(len(uniforms)):
         node = select_one(queue, uniforms[row, 0], uniforms[row, 1])
         child = first + row
         for axis in range(len(low)):
             columns.controls[child, axis] = low[axis] + (high[axis] - low[axis]) * uniforms[row, 2 + axis]
-        reward, terminal, success = step(reals, integers, columns.states[node], columns.controls[child],
-                                         columns.states[child])
+        reward, terminal, success = step(reals, table, integers, columns.states, node, columns.controls, child)
         for axis in range(len(feature_dims)):
             columns.features[child, axis] = columns.states[child, feature_dims[axis]]
         columns.parents[child] = node
         columns.rewards[child] = reward
         columns.terminal[child] = terminal
         done = row + 1
-        if not _finite(columns.states[child]):
+        if not _finite(columns.states, child):
             return done, NOT_FINITE
         if success:
             return done, GOAL
-        if not terminal and not insert_one(queue, columns.features[child], bin_size, child):
+        if not terminal and not insert_one(queue, columns.features, child, bin_size, child, cell):
             return done, FULL
     return done, DONE

@@ -1,9 +1,9 @@
 """Time one gradient step of DDPG, ours against stable-baselines3's, in one run.
 
-    python tests/benchmarks/gradient_step.py [--compile] [--rounds 9]
+    python tests/benchmarks/gradient_step.py [--update auto|eager|compiled] [--rounds 9]
 
-Both update actor, critic and targets from a full replay buffer with the same networks, mini-batches of 100 and learning
-rates. Ratios of medians are what counts; the rounds of both alternate, so that both see the same noise.
+Both update actor, critic and targets from a full replay buffer with the same networks, mini-batches of 100 and
+learning rates. Ratios of medians are what counts; rounds of both alternate, so that both see the same noise.
 """
 
 import argparse
@@ -19,8 +19,10 @@ from stable_baselines3 import DDPG as TheirDDPG
 from stable_baselines3.common.logger import configure
 
 from pbcs_ompl.agents import DDPG, DDPGSettings
+from pbcs_ompl.agents.update import Compile
 
 OBSERVATIONS, ACTIONS, FILL, BATCH = 2, 2, 20_000, 100
+COMPILE: dict[str, Compile] = {"auto": "auto", "eager": False, "compiled": True}
 BARS = {(64, 64): 6.0, (256, 256): 2.0, (400, 300): 2.0}
 
 
@@ -41,7 +43,7 @@ def transitions(count: int) -> tuple[np.ndarray, ...]:
             rng.random(count) < 0.05)
 
 
-def ours(hidden: tuple[int, ...], seeds: int, compile: bool) -> Callable[[int], object]:
+def ours(hidden: tuple[int, ...], seeds: int, compile: Compile) -> Callable[[int], object]:
     agent = DDPG(OBSERVATIONS, [-1.0] * ACTIONS, [1.0] * ACTIONS, settings=DDPGSettings(hidden=hidden),
                  seeds=range(seeds), compile=compile)
     agent.remember(*(np.stack([field] * seeds) for field in transitions(FILL)))
@@ -71,18 +73,18 @@ def microseconds(rows: list[tuple[Callable[[int], object], int]], rounds: int) -
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--compile", action="store_true", help="compile our update with torch.compile")
+    parser.add_argument("--update", choices=COMPILE, default="auto", help="how our update runs")
     parser.add_argument("--rounds", type=int, default=9)
     options = parser.parse_args()
     for hidden, bar in BARS.items():
         torch.set_num_threads(1)
         count = 200 if max(hidden) <= 64 else 40
-        rows = [(ours(hidden, 1, options.compile), count), (theirs(hidden), count)]
+        rows = [(ours(hidden, 1, COMPILE[options.update]), count), (theirs(hidden), count)]
         mine, other = microseconds(rows, options.rounds)
         print(f"{hidden}, one thread: {mine:.0f} us, stable-baselines3 {other:.0f} us: {other / mine:.1f} times faster "
               f"(bar {bar:g})", flush=True)
     torch.set_num_threads(2)
-    stack, other = microseconds([(ours((64, 64), 32, options.compile), 20), (theirs((64, 64)), 100)], options.rounds)
+    stack, other = microseconds([(ours((64, 64), 32, COMPILE[options.update]), 20), (theirs((64, 64)), 100)], options.rounds)
     print(f"(64, 64), 32 seeds, two threads: {stack / 32:.0f} us a seed, stable-baselines3 {other:.0f} us: "
           f"{other / stack * 32:.1f} times faster (target 8)")
 

@@ -2,7 +2,7 @@
 
     python tests/benchmarks/propagator_cost.py
 
-The loop itself and OMPL's call are included; `step_one` alone and an empty Python propagator are measured beside
+The loop and OMPL's call are included; `step_one` alone and an empty Python propagator are measured beside
 it in the same run, so that the share of the bridge can be told from that of the environment.
 """
 

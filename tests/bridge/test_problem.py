@@ -168,7 +168,8 @@ def test_goal_is_strict_and_gives_no_bias(square):
 
 
 @pytest.mark.parametrize(("start", "message"), [
-    ([2.1, 1.0], "inside a wall"), ([6.0, 1.0], "dimension 0"), ([1.0, math.nan], "not finite"), ([1.0], "shape"),
+    ([2.1, 1.0], "inside a wall"), ([6.0, 1.0], "dimension 0"), ([1.0, math.nan], "not finite"),
+    ([1.0], "shape"),
 ])
 def test_impossible_start_is_refused(square, start, message):
     with pytest.raises(InvalidState, match=message):

@@ -1,5 +1,6 @@
 """The grammar of the command line: every mistake is one clear line, and help costs nothing."""
 
+import contextlib
 import subprocess
 import sys
 
@@ -31,7 +32,7 @@ MISTAKES = [
     ("train --env pbcs/Maze-v0 --method pcbs", "unknown method 'pcbs'; did you mean 'pbcs'?"),
     ("train --env pbcs/Maze-v0 --preset thesys", "did you mean 'thesis'?"),
     ("train", "--env is missing"),
-    ("train --resume runs/nowhere --seed 3", "--resume takes every setting from runs/nowhere; remove --seed"),
+    ("train --resume runs/nowhere --seed 3", "but --max-transitions from runs/nowhere; remove --seed"),
     ("train --resume runs/nowhere", "runs/nowhere/config.toml does not exist"),
     ("eval", "required: DIR"),
     ("eval runs/nowhere", "runs/nowhere"),
@@ -57,10 +58,8 @@ def test_a_mistake_is_one_line_and_status_2(line, expected, capsys, tmp_path, mo
 
 @given(st.lists(st.text(min_size=1), max_size=5))
 def test_no_words_crash_the_parser(words):
-    try:
-        parse(build_parser(), words)
-    except (PbcsError, SystemExit):
-        pass
+    with contextlib.suppress(PbcsError, SystemExit):
+        assert parse(build_parser(), words).verb
 
 
 @given(st.integers(0, 2**63))
@@ -83,10 +82,11 @@ def test_help_and_version_import_nothing_heavy():
     code = ("import sys, pbcs_ompl.cli as c\n"
             "try: c.main([sys.argv[1]])\n"
             "except SystemExit: pass\n"
-            "print(sorted({'numpy', 'ompl', 'torch', 'gymnasium', 'matplotlib', 'rich', 'numba'} & set(sys.modules)))")
+            "print(*sys.modules)")
     for option in ("--help", "--version"):
-        shown = subprocess.run([sys.executable, "-c", code, option], capture_output=True, text=True, check=True)
-        assert shown.stdout.splitlines()[-1] == "[]"
+        run = subprocess.run([sys.executable, "-c", code, option], capture_output=True, text=True, check=True)
+        imported = set(run.stdout.splitlines()[-1].split())
+        assert not imported & {"numpy", "ompl", "torch", "gymnasium", "matplotlib", "rich", "numba"}
 
 
 def test_help_names_every_verb(capsys):

@@ -1,0 +1,142 @@
+"""The update of `ddpg.py` as one kernel: what runs on a CPU, seed by seed, many updates in one call."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit, prange
+
+from pbcs_ompl.agents.network_kernels import Sizes, backward, descend, follow, forward, outputs_at, tape_length
+
+
+class Stack(NamedTuple):
+    """A `TrainedNetwork` in plain arrays [S * P]."""
+
+    sizes: Sizes
+    seeds: int
+    weights: np.ndarray
+    target: np.ndarray
+    mean: np.ndarray
+    square: np.ndarray
+
+
+class Constants(NamedTuple):
+    """What does not change; float32. Actions are centre + half tanh(outputs)."""
+
+    half: np.ndarray
+    centre: np.ndarray
+    discount: np.float32
+    share: np.float32
+    """1 - polyak"""
+
+
+class Scratch(NamedTuple):
+    """Working memory of one seed."""
+
+    actor_tape: np.ndarray
+    actor_slopes: np.ndarray
+    actor_gradient: np.ndarray
+    critic_tape: np.ndarray
+    critic_slopes: np.ndarray
+    critic_gradient: np.ndarray
+    targets: np.ndarray
+
+
+def _update(rows: np.ndarray, rates: np.ndarray, actor: Stack, critic: Stack, constants: Constants,
+            losses: np.ndarray) -> None:
+    """Make K updates of S seeds.
+
+    Args:
+        rows: Mini-batches [K, S, B, W], see `Replay.unpack`.
+        rates: [K, 2, 2], see `adam_rates`; the actor's first.
+        losses: Filled with the critic's and the actor's losses [K, S, 2].
+    """
+    for seed in prange(rows.shape[1]):
+        scratch = _scratch(actor, critic, rows.shape[2])
+        for k in range(rows.shape[0]):
+            losses[k, seed, 0] = _critic_gradient(rows[k, seed], seed, actor, critic, constants, scratch)
+            descend(critic.sizes, critic.weights, critic.mean, critic.square, critic.seeds, seed,
+                    scratch.critic_gradient, rates[k, 1])
+            losses[k, seed, 1] = _actor_gradient(rows[k, seed], seed, actor, critic, constants, scratch)
+            descend(actor.sizes, actor.weights, actor.mean, actor.square, actor.seeds, seed,
+                    scratch.actor_gradient, rates[k, 0])
+            follow(actor.sizes, actor.weights, actor.target, actor.seeds, seed, constants.share)
+            follow(critic.sizes, critic.weights, critic.target, critic.seeds, seed, constants.share)
+
+
+@njit(cache=True)
+def _scratch(actor: Stack, critic: Stack, batch: int) -> Scratch:
+    long, short = tape_length(critic.sizes, batch), tape_length(actor.sizes, batch)
+    return Scratch(np.empty(short, np.float32), np.empty(short, np.float32),
+                   np.empty(len(actor.weights) // actor.seeds, np.float32),
+                   np.empty(long, np.float32), np.empty(long, np.float32),
+                   np.empty(len(critic.weights) // critic.seeds, np.float32), np.empty(batch, np.float32))
+
+
+@njit(cache=True)
+def _act(actor: Stack, flat: np.ndarray, seed: int, observations: np.ndarray, constants: Constants,
+         tape: np.ndarray, pairs: np.ndarray) -> None:
+    """Run the actor `flat` on observations [B, O]; leave tanh(outputs) on its tape and the critic's inputs in `pairs`."""
+    batch, width = observations.shape
+    actions = actor.sizes[-1]
+    for item in range(batch):
+        for i in range(width):
+            tape[item * width + i] = observations[item, i]
+            pairs[item * (width + actions) + i] = observations[item, i]
+    forward(actor.sizes, flat, actor.seeds, seed, tape, batch)
+    out = outputs_at(actor.sizes, batch)
+    for item in range(batch):
+        for a in range(actions):
+            unit = np.tanh(tape[out + item * actions + a])
+            tape[out + item * actions + a] = unit
+            pairs[item * (width + actions) + width + a] = constants.centre[a] + constants.half[a] * unit
+
+
+@njit(cache=True)
+def _critic_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, constants: Constants,
+                     scratch: Scratch) -> float:
+    batch, size, pair = rows.shape[0], actor.sizes[0], critic.sizes[0]
+    tape, out = scratch.critic_tape, outputs_at(critic.sizes, batch)
+    _act(actor, actor.target, seed, rows[:, pair + 2 :], constants, scratch.actor_tape, tape)
+    forward(critic.sizes, critic.target, critic.seeds, seed, tape, batch)
+    for item in range(batch):
+        following = constants.discount * rows[item, pair + 1] * tape[out + item]
+        scratch.targets[item] = rows[item, pair] + following
+        for i in range(pair):
+            tape[item * pair + i] = rows[item, i]
+    forward(critic.sizes, critic.weights, critic.seeds, seed, tape, batch)
+    loss = np.float32(0.0)
+    for item in range(batch):
+        error = tape[out + item] - scratch.targets[item]
+        loss += error * error
+        scratch.critic_slopes[out + item] = error * np.float32(2.0 / batch)
+    backward(critic.sizes, critic.weights, critic.seeds, seed, tape, scratch.critic_slopes, batch,
+             scratch.critic_gradient, False)
+    return loss / batch
+
+
+@njit(cache=True)
+def _actor_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, constants: Constants,
+                    scratch: Scratch) -> float:
+    batch, size, pair = rows.shape[0], actor.sizes[0], critic.sizes[0]
+    tape, out = scratch.critic_tape, outputs_at(critic.sizes, batch)
+    _act(actor, actor.weights, seed, rows[:, :size], constants, scratch.actor_tape, tape)
+    forward(critic.sizes, critic.weights, critic.seeds, seed, tape, batch)
+    loss = np.float32(0.0)
+    for item in range(batch):
+        loss -= tape[out + item]
+        scratch.critic_slopes[out + item] = np.float32(-1.0 / batch)
+    backward(critic.sizes, critic.weights, critic.seeds, seed, tape, scratch.critic_slopes, batch,
+             np.empty(0, np.float32), True)
+    out, actions = outputs_at(actor.sizes, batch), pair - size
+    for item in range(batch):
+        for a in range(actions):
+            unit = scratch.actor_tape[out + item * actions + a]
+            slope = scratch.critic_slopes[item * pair + size + a] * constants.half[a]
+            scratch.actor_slopes[out + item * actions + a] = slope * (np.float32(1.0) - unit * unit)
+    backward(actor.sizes, actor.weights, actor.seeds, seed, scratch.actor_tape, scratch.actor_slopes, batch,
+             scratch.actor_gradient, False)
+    return loss / batch
+
+
+update_one = njit(cache=True)(_update)
+update_many = njit(cache=True, parallel=True)(_update)

@@ -1,0 +1,1 @@
+"""Planners compared: the same environment, many seeds, every run recorded."""

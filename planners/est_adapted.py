@@ -1,0 +1,58 @@
+"""EST for reinforcement learning: random actions from nodes in sparse regions ([Matheron2020] 3.2)."""
+
+import numpy as np
+
+from pbcs_ompl.core.contracts import IndexArray
+from planners.kernels.bin_queue import empty_queue, insert
+from planners.kernels.sparse import draw_sparse
+from planners.options import positive
+from planners.strategy import Space, Strategy
+from planners.tree import Tree
+from planners.tree_planner import StrategyPlanner
+
+NODES_PER_BATCH = 100
+WIDEST = 4
+"""Beyond this number of features the bins around a bin are too many to look at."""
+
+
+class SparseFirst(Strategy):
+    """Draw nodes with probability proportional to 1 / omega(s), omega the number of nodes closer than d to s.
+
+    Differs: omega counts the nodes in the 3^F bins of edge d around s's bin instead of a ball of radius d; with more
+    than four features, in s's bin alone. And with batches, the nodes of a batch (one percent of the tree) do not
+    see each other's children.
+
+    Args:
+        distance: d; by default twice the bin size that the problem suggests, along each feature.
+    """
+
+    def __init__(self, distance: float | None = None):
+        self._distance = None if distance is None else positive("distance", distance)
+
+    def start(self, space: Space, rng: np.random.Generator) -> None:
+        """Begin without bins."""
+        super().start(space, rng)
+        features = len(space.bin_size)
+        self._size = 2.0 * space.bin_size if self._distance is None else np.full(features, self._distance)
+        self._reach = 1 if features <= WIDEST else 0
+        self._bins = empty_queue(features)
+
+    def batch(self, tree: Tree) -> int:
+        """Return one percent of the nodes."""
+        return max(1, len(tree) // NODES_PER_BATCH)
+
+    def select(self, tree: Tree, count: int) -> IndexArray:
+        """Return `count` independent draws."""
+        nodes = np.empty(count, np.int64)
+        draw_sparse(self._bins, self._reach, self.rng, nodes)
+        return nodes
+
+    def inserted(self, tree: Tree, first: int, last: int) -> None:
+        """Put the new nodes that are not terminal into their bins."""
+        self._bins = insert(self._bins, tree.features[first:last], tree.terminal[first:last], self._size, first)
+
+
+class ESTAdapted(StrategyPlanner):
+    """EST with random actions as an OMPL planner, for any `ompl.control.SpaceInformation`."""
+
+    strategy_class = SparseFirst

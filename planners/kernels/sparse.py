@@ -1,0 +1,43 @@
+"""Random nodes of sparse regions, from the bins of a BinQueue."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from planners.kernels.bin_queue import BINS, LENGTH, START, BinQueue, find_cell
+from planners.kernels.runs import MEMBER
+
+
+@njit(cache=True)
+def draw_sparse(queue: BinQueue, reach: int, rng: np.random.Generator, nodes: NDArray[np.int64]) -> None:
+    """Write into nodes [B] independent draws with probability proportional to 1 / (nodes in the bins around).
+
+    Around a bin are the (2 reach + 1)^F bins that differ by at most `reach` in each coordinate. A random bin
+    with n nodes and m around it is kept with probability n / m, then any of its nodes is as good: each node's
+    chance is proportional to (n / m) / n.
+    """
+    cell = np.empty(queue.cells.shape[1], np.int64)
+    for row in range(len(nodes)):
+        while True:
+            number = int(rng.random() * queue.used[BINS])
+            inside = queue.slices[number, LENGTH]
+            if rng.random() * _around(queue, number, reach, cell) < inside:
+                break
+        nodes[row] = queue.pool[queue.slices[number, START] + int(rng.random() * inside), MEMBER]
+
+
+@njit(cache=True)
+def _around(queue, number, reach, cell):
+    """Return how many nodes are in the bins around one, itself included."""
+    axes = len(cell)
+    width = 2 * reach + 1
+    total = 0
+    for code in range(width ** axes):
+        rest = code
+        for axis in range(axes):
+            cell[axis] = queue.cells[number, axis] + rest % width - reach
+            rest //= width
+        place = find_cell(queue.cells, queue.table, cell)
+        if queue.table[place] >= 0:
+            total += queue.slices[queue.table[place], LENGTH]
+    return total

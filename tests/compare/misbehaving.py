@@ -1,0 +1,41 @@
+"""Planners that go wrong, found as `misbehaving:NAME` by the processes of a comparison."""
+
+import os
+import signal
+from pathlib import Path
+
+from ompl import base as ob
+
+
+class Broken(ob.Planner):
+    """Raises when it is asked to plan."""
+
+    def __init__(self, si):
+        super().__init__(si, "Broken")
+
+    def solve(self, ptc):
+        raise RuntimeError("this planner\nis broken")
+
+
+class Deadly(ob.Planner):
+    """Takes the whole process down, as a bug in C++ does."""
+
+    def __init__(self, si):
+        super().__init__(si, "Deadly")
+
+    def solve(self, ptc):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Waiting(ob.Planner):
+    """Says where it is, and waits for the end of its budget."""
+
+    def __init__(self, si, told=""):
+        super().__init__(si, "Waiting")
+        self.told = told
+
+    def solve(self, ptc):
+        Path(self.told).write_text(str(os.getpid()))
+        while not ptc():
+            pass
+        return ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)

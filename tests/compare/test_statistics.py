@@ -1,0 +1,38 @@
+"""Laws of the rows: censored medians, intervals that contain the rate."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pbcs_ompl.compare.run import Job, broken
+from pbcs_ompl.compare.statistics import row
+
+
+def record(solved, transitions=10, seconds=1.0):
+    return {"planner": "P", "seed": 0, "solved": solved, "transitions": transitions, "seconds": seconds,
+            "reason": None}
+
+
+@given(st.lists(st.tuples(st.booleans(), st.integers(1, 1000)), min_size=1, max_size=20))
+def test_rows_hold_together(runs):
+    summary = row("P", [record(solved, transitions) for solved, transitions in runs], 1000)
+    low, high = summary["wilson"]
+    assert 0 <= low <= summary["solved"] / summary["runs"] <= high <= 1
+    first, third = summary["transitions_quartiles"]
+    assert first <= summary["transitions_median"] <= third <= 1000
+    if 2 * summary["solved"] < len(runs):
+        assert summary["transitions_median"] == 1000
+
+
+def test_unsolved_runs_count_as_the_whole_budget():
+    runs = [record(True, 100), record(True, 300), record(False, 500)]
+    assert row("P", runs, 1000)["transitions_median"] == 300
+    assert row("P", [*runs, record(False, 500)], 1000)["transitions_median"] == 650
+
+
+def test_broken_runs_have_no_seconds_and_say_why():
+    job = Job("P", 0, "env", {}, {}, 1000, None)
+    summary = row("P", [broken(job, "first\nreason"), broken(job, "second")], 1000)
+    assert (summary["reason"], summary["transitions_median"], summary["seconds_median"]) == \
+        ("first reason", None, None)
+    mixed = row("P", [broken(job, "why"), record(True, 10, 2.0)], 1000)
+    assert (mixed["seconds_median"], mixed["transitions_median"], mixed["reason"]) == (2.0, 505.0, "why")
