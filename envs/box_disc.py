@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from envs import box_disc_kernels as kernels
-from envs.point_env import PointEnv
+from envs.point_env import CompiledStep, PointEnv
 from envs.rendering import rasterise
 from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption
@@ -32,17 +32,21 @@ class BoxEnv(PointEnv):
                  terminate_on_success: bool = True, normalize_actions: bool = False,
                  render_mode: str | None = None):
         super().__init__(EXTENT, start, goal, terminate_on_success=terminate_on_success,
-                         normalize_actions=normalize_actions, render_mode=render_mode)
+                         normalize_actions=normalize_actions, own_settings=(EXTENT,), render_mode=render_mode)
 
     def move(self, states: Array, controls: Array) -> tuple[Array, BoolArray]:
         """Return the next states [B, 2] and whether the border was hit [B]."""
-        return kernels.move_in_box(self.settings, EXTENT, states, controls)
+        return kernels.move_in_box(self.settings, states, controls)
 
     def step_one(self, state: list[float], control: list[float]) -> list[float]:
         """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
         x, y = state
         a, b = control
-        return [*kernels.step_one_in_box(self.settings, EXTENT, x, y, a, b)]
+        return [*kernels.step_one_in_box(self.settings, x, y, a, b)]
+
+    def compiled_step(self) -> CompiledStep:
+        """Return the step as a function for compiled planners."""
+        return kernels.compiled_step_in_box, self.settings, np.zeros((1, 1)), np.zeros(1, dtype=np.int64)
 
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, 2] lie in S [B]."""
@@ -81,28 +85,31 @@ class DiscEnv(PointEnv):
             raise InvalidOption(f"centre={centre!r}, radius={radius!r}: the disc must lie within [0, 5]^2")
         if not 0.0 <= perturbation <= 0.1:
             raise InvalidOption(f"perturbation={perturbation!r}: expected a number from 0 to 0.1")
-        self.disc = np.array([x, y, radius, perturbation], dtype=np.float64)
+        self.disc = (float(x), float(y), float(radius))
         super().__init__(EXTENT, centre if start is None else start, goal,
                          terminate_on_success=terminate_on_success, normalize_actions=normalize_actions,
-                         render_mode=render_mode)
+                         own_settings=(*self.disc, perturbation), render_mode=render_mode)
 
     def move(self, states: Array, controls: Array) -> tuple[Array, BoolArray]:
         """Return the next states [B, 2] and whether the border was hit [B]."""
-        return kernels.move_in_disc(self.settings, self.disc, states, controls)
+        return kernels.move_in_disc(self.settings, states, controls)
 
     def step_one(self, state: list[float], control: list[float]) -> list[float]:
         """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
         x, y = state
         a, b = control
-        return [*kernels.step_one_in_disc(self.settings, self.disc, x, y, a, b)]
+        return [*kernels.step_one_in_disc(self.settings, x, y, a, b)]
+
+    def compiled_step(self) -> CompiledStep:
+        """Return the step as a function for compiled planners."""
+        return kernels.compiled_step_in_disc, self.settings, np.zeros((1, 1)), np.zeros(1, dtype=np.int64)
 
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, 2] lie in the disc [B]."""
-        return kernels.in_disc(self.disc, np.ascontiguousarray(states, dtype=np.float64))
+        return kernels.in_disc(self.settings, np.ascontiguousarray(states, dtype=np.float64))
 
     def render(self) -> Any:
         """Return the picture as an array [480, 480, 3] of uint8, for "rgb_array"."""
         if self.render_mode is None:
             return None
-        x, y, radius, _ = self.disc.tolist()
-        return rasterise(EXTENT, self.walls, self.goal_circle, self._state, ground=(x, y, radius))
+        return rasterise(EXTENT, self.walls, self.goal_circle, self._state, ground=self.disc)

@@ -1,48 +1,59 @@
-"""The steps of the box and the disc, compiled: arrays in, arrays out.
-
-`disc` is the array (x, y, radius, perturbation).
-"""
+"""The steps of the box and the disc, compiled: arrays in, arrays out."""
 
 import numpy as np
 from numba import njit
 
-from envs.point_kernels import displacement
-from pbcs_ompl.core.contracts import Array, BoolArray
+from envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
+from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
 
 Point = tuple[float, float]
 Step = tuple[float, float, bool]
 
+# Places of their own settings in the array `settings`, after those of `point_kernels`.
+EXTENT = FIRST_FREE
+DISC_X, DISC_Y, DISC_RADIUS, PERTURBATION = range(FIRST_FREE, FIRST_FREE + 4)
+
 
 @njit(cache=True)
-def _move_in_box(settings: Array, extent: float, x: float, y: float, a: float, b: float) -> Step:
+def _move_in_box(settings: Array, x: float, y: float, a: float, b: float) -> Step:
     x1, y1 = x + displacement(settings, a), y + displacement(settings, b)
-    if x1 < 0.0 or x1 > extent or y1 < 0.0 or y1 > extent:
+    if x1 < 0.0 or x1 > settings[EXTENT] or y1 < 0.0 or y1 > settings[EXTENT]:
         return x, y, True
     return x1, y1, False
 
 
 @njit(cache=True)
-def step_one_in_box(settings: Array, extent: float, x: float, y: float, a: float, b: float) -> Point:
+def step_one_in_box(settings: Array, x: float, y: float, a: float, b: float) -> Point:
     """Return the next position of one point as a tuple of two floats."""
-    x1, y1, _ = _move_in_box(settings, extent, x, y, a, b)
+    x1, y1, _ = _move_in_box(settings, x, y, a, b)
     return x1, y1
 
 
 @njit(cache=True)
-def move_in_box(settings: Array, extent: float, states: Array, controls: Array) -> tuple[Array, BoolArray]:
+def move_in_box(settings: Array, states: Array, controls: Array) -> tuple[Array, BoolArray]:
     """Return the next states [B, 2] after controls [B, 2], and whether the border was hit [B]."""
     after = np.empty((states.shape[0], 2))
     hits = np.empty(states.shape[0], dtype=np.bool_)
     for k in range(states.shape[0]):
         after[k, 0], after[k, 1], hits[k] = _move_in_box(
-            settings, extent, states[k, 0], states[k, 1], controls[k, 0], controls[k, 1])
+            settings, states[k, 0], states[k, 1], controls[k, 0], controls[k, 1])
     return after, hits
 
 
+@njit(COMPILED_STEP, cache=True)
+def compiled_step_in_box(settings: Array, table: Array, integers: IndexArray, states: Array, parent: int,
+                         controls: Array, child: int) -> tuple[float, bool, bool]:
+    """Write states[child] from states[parent] and controls[child]; return reward, terminated, success."""
+    x, y, hit = _move_in_box(settings, states[parent, 0], states[parent, 1],
+                             controls[child, 0], controls[child, 1])
+    states[child, 0], states[child, 1] = x, y
+    return outcome(settings, x, y, hit)
+
+
 @njit(cache=True)
-def _inside(disc: Array, x: float, y: float) -> bool:
-    dx, dy = x - disc[0], y - disc[1]
-    return dx * dx + dy * dy <= disc[2] * disc[2]
+def _inside(settings: Array, x: float, y: float) -> bool:
+    dx, dy = x - settings[DISC_X], y - settings[DISC_Y]
+    return dx * dx + dy * dy <= settings[DISC_RADIUS] * settings[DISC_RADIUS]
 
 
 @njit(cache=True)
@@ -61,39 +72,50 @@ def _signed_fraction(bits: np.uint64) -> float:
 
 
 @njit(cache=True)
-def _move_in_disc(settings: Array, disc: Array, x: float, y: float, a: float, b: float) -> Step:
+def _move_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> Step:
     x1, y1 = x + displacement(settings, a), y + displacement(settings, b)
-    if _inside(disc, x1, y1) or x1 != x1 or y1 != y1:
+    if _inside(settings, x1, y1) or x1 != x1 or y1 != y1:
         return x1, y1, False
     bits = _mix(_mix(_mix(_mix(np.uint64(0), x), y), a), b)
-    x1, y1 = x + disc[3] * _signed_fraction(bits), y + disc[3] * _signed_fraction(_mix(bits, 1.0))
-    if _inside(disc, x1, y1):
+    x1 = x + settings[PERTURBATION] * _signed_fraction(bits)
+    y1 = y + settings[PERTURBATION] * _signed_fraction(_mix(bits, 1.0))
+    if _inside(settings, x1, y1):
         return x1, y1, True
     return x, y, True
 
 
 @njit(cache=True)
-def step_one_in_disc(settings: Array, disc: Array, x: float, y: float, a: float, b: float) -> Point:
+def step_one_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> Point:
     """Return the next position of one point as a tuple of two floats."""
-    x1, y1, _ = _move_in_disc(settings, disc, x, y, a, b)
+    x1, y1, _ = _move_in_disc(settings, x, y, a, b)
     return x1, y1
 
 
 @njit(cache=True)
-def move_in_disc(settings: Array, disc: Array, states: Array, controls: Array) -> tuple[Array, BoolArray]:
+def move_in_disc(settings: Array, states: Array, controls: Array) -> tuple[Array, BoolArray]:
     """Return the next states [B, 2] after controls [B, 2], and whether the border was hit [B]."""
     after = np.empty((states.shape[0], 2))
     hits = np.empty(states.shape[0], dtype=np.bool_)
     for k in range(states.shape[0]):
         after[k, 0], after[k, 1], hits[k] = _move_in_disc(
-            settings, disc, states[k, 0], states[k, 1], controls[k, 0], controls[k, 1])
+            settings, states[k, 0], states[k, 1], controls[k, 0], controls[k, 1])
     return after, hits
 
 
+@njit(COMPILED_STEP, cache=True)
+def compiled_step_in_disc(settings: Array, table: Array, integers: IndexArray, states: Array, parent: int,
+                          controls: Array, child: int) -> tuple[float, bool, bool]:
+    """Write states[child] from states[parent] and controls[child]; return reward, terminated, success."""
+    x, y, hit = _move_in_disc(settings, states[parent, 0], states[parent, 1],
+                              controls[child, 0], controls[child, 1])
+    states[child, 0], states[child, 1] = x, y
+    return outcome(settings, x, y, hit)
+
+
 @njit(cache=True)
-def in_disc(disc: Array, states: Array) -> BoolArray:
+def in_disc(settings: Array, states: Array) -> BoolArray:
     """Return which states [B, 2] lie in the disc [B]."""
     inside = np.empty(states.shape[0], dtype=np.bool_)
     for k in range(states.shape[0]):
-        inside[k] = _inside(disc, states[k, 0], states[k, 1])
+        inside[k] = _inside(settings, states[k, 0], states[k, 1])
     return inside

@@ -9,6 +9,11 @@ from pbcs_ompl.core.contracts import Array, BoolArray
 LIMIT, SCALE, GOAL_X, GOAL_Y, GOAL_RADIUS, PENALTY, TERMINATE, FIRST_FREE = range(8)
 
 
+COMPILED_STEP = "Tuple((f8, b1, b1))(f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, f8[:, ::1], i8)"
+"""The signature of a step for compiled planners: step(settings, table, integers, states, parent, controls,
+child) writes states[child] and returns reward, terminated, success."""
+
+
 @njit(cache=True)
 def displacement(settings: Array, a: float) -> float:
     """Return how far a control moves the point along one axis; NaN stays NaN."""
@@ -36,6 +41,14 @@ def goal_distance(settings: Array, states: Array) -> Array:
 
 
 @njit(cache=True)
+def outcome(settings: Array, x: float, y: float, hit: bool) -> tuple[float, bool, bool]:
+    """Return reward, terminated and success of a step that ended in (x, y)."""
+    reached = _distance(settings, x, y) < settings[GOAL_RADIUS]
+    reward = (1.0 if reached else 0.0) + (settings[PENALTY] if hit else 0.0)
+    return reward, reached and settings[TERMINATE] != 0.0, reached
+
+
+@njit(cache=True)
 def finish(settings: Array, after: Array, hits: BoolArray) -> tuple[Array, BoolArray, BoolArray]:
     """Return rewards, terminated and success [B] of steps to `after` [B, 2] that hit a wall or not [B]."""
     count = after.shape[0]
@@ -43,8 +56,5 @@ def finish(settings: Array, after: Array, hits: BoolArray) -> tuple[Array, BoolA
     terminated = np.empty(count, dtype=np.bool_)
     success = np.empty(count, dtype=np.bool_)
     for k in range(count):
-        reached = _distance(settings, after[k, 0], after[k, 1]) < settings[GOAL_RADIUS]
-        rewards[k] = (1.0 if reached else 0.0) + (settings[PENALTY] if hits[k] else 0.0)
-        terminated[k] = reached and settings[TERMINATE] != 0.0
-        success[k] = reached
+        rewards[k], terminated[k], success[k] = outcome(settings, after[k, 0], after[k, 1], hits[k])
     return rewards, terminated, success

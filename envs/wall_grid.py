@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.contracts import Array, IndexArray
 
 CELLS_PER_UNIT = 5
 MARGIN = 1e-6
@@ -13,14 +12,13 @@ MARGIN = 1e-6
 
 
 class WallGrid(NamedTuple):
-    """Walls by grid cell, in compressed rows: cell c is near the walls `nearby[first[c]:first[c + 1]]`."""
+    """Walls by grid cell, in compressed rows: near cell c are the walls `lists[lists[c]:lists[c + 1]]`."""
 
     rectangles: Array
     """Walls [W, 4]."""
-    first: NDArray[np.int32]
-    """Where the walls of each cell begin [C * C + 1]; cell (i, j) is number i * C + j."""
-    nearby: NDArray[np.int32]
-    """Numbers of walls, cell after cell."""
+    lists: IndexArray
+    """Where the walls of each cell begin in this same array [C * C + 1], then the numbers of the walls, cell
+    after cell. Cell (i, j) is number i * C + j."""
     cells: int
     """Number C of cells along each axis."""
 
@@ -41,7 +39,6 @@ def build_wall_grid(rectangles: Array, extent: float, reach: float) -> WallGrid:
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
                 near[i * cells + j].append(wall)
-    first = np.zeros(cells * cells + 1, dtype=np.int32)
-    np.cumsum([len(walls) for walls in near], out=first[1:])
-    nearby = np.array([wall for walls in near for wall in walls], dtype=np.int32)
-    return WallGrid(np.ascontiguousarray(rectangles), first, nearby, cells)
+    begins = np.cumsum([len(near) + 1, *map(len, near)])
+    lists = np.array([*begins, *(wall for walls in near for wall in walls)], dtype=np.int64)
+    return WallGrid(np.array(rectangles), lists, cells)

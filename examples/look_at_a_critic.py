@@ -23,7 +23,7 @@ def main(updates: str = "5000", folder: str = "runs/example-critic") -> None:
     print(f"{len(children):,} transitions, {int(outcome.success.sum())} of them into the goal")
 
     agent = DDPG(model.observation_size, model.action_low, model.action_high, seeds=(0,),
-                 settings=DDPGSettings.from_preset("thesis"))  # a stack of one agent: the first axis is the seed
+                 settings=DDPGSettings.from_preset("fast"))  # a stack of one agent, axis S first
     agent.remember(model.observe(states)[None], controls[None], outcome.rewards[None],
                    model.observe(outcome.states)[None], outcome.terminated[None])
     agent.train(int(updates))
@@ -34,10 +34,10 @@ def main(updates: str = "5000", folder: str = "runs/example-critic") -> None:
     def critic(observations, actions):
         return agent.value(observations[None], actions[None])[0]
 
-    rollout = [model.initial_state()]
+    rollout = [model.initial_state()[None]]
     for _ in range(100):
-        rollout.append(model.transition(rollout[-1][None], policy(model.observe(rollout[-1][None]))).states[0])
-    figure = critic_figure(model, policy, critic, rollout=np.array(rollout),
+        rollout.append(model.transition(rollout[-1], policy(model.observe(rollout[-1]))).states)
+    figure = critic_figure(model, policy, critic, rollout=np.concatenate(rollout),
                            title=f"offline DDPG: {len(children):,} transitions, {int(updates):,} updates")
     print(f"picture in {save(figure, Path(folder) / 'critic.png')}")
 

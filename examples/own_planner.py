@@ -29,16 +29,15 @@ class Emptiest(Strategy):
 
     def start(self, space, rng):
         super().start(space, rng)
-        self.bins = []  # of each node
-        self.expansions = Counter()  # of each bin
+        self.bins, self.expansions = [], Counter()  # the bin of each node, the expansions of each bin
 
     def inserted(self, tree, first, last):
         self.bins += map(tuple, np.floor(tree.features[first:last] / self.space.bin_size).tolist())
 
     def select(self, tree, count):
-        return np.array([self._select_one(tree) for _ in range(count)])
+        return np.array([self.select_one(tree) for _ in range(count)])
 
-    def _select_one(self, tree):
+    def select_one(self, tree):
         drawn = self.rng.integers(len(tree), size=self.candidates)
         expandable = [*drawn[~tree.terminal[drawn]], 0]  # node 0 is the start, which is never terminal
         best = min(expandable, key=lambda node: self.expansions[self.bins[node]])
@@ -47,7 +46,7 @@ class Emptiest(Strategy):
 
 
 class Nearest(ob.Planner):
-    """A plain OMPL planner that knows nothing of this project: extend the node nearest to a random state."""
+    """A plain OMPL planner that knows nothing of this project: extend the node nearest to a sample."""
 
     def __init__(self, si, seed=0):
         super().__init__(si, "Nearest")
@@ -85,8 +84,7 @@ def path_to_last(si, tree, buffer):
 
 
 def fill(buffer, numbers):
-    for index, number in enumerate(numbers):
-        buffer[index] = number
+    buffer[0], buffer[1] = numbers
     return buffer
 
 

@@ -1,6 +1,6 @@
 """The one OMPL planner of this package: it grows a tree, and a strategy says where."""
 
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from ompl import base as ob
@@ -16,6 +16,7 @@ from planners.options import positive_integer
 from planners.strategy import Strategy
 from planners.tree import Tree
 
+ErrorType = TypeVar("ErrorType", bound=Exception)
 CHUNK = 2048
 """Expansions of one compiled call, between two looks at the termination condition: less than a millisecond."""
 
@@ -87,9 +88,9 @@ class TreePlanner(ob.Planner):
         try:
             return ob.PlannerStatus(self._solve(_condition(ptc)))
         except PbcsError as error:
-            self.error = error
+            self.error = _without_own_frames(error)
         except Exception as error:
-            self.error = _failure(self.getName(), error)
+            self.error = _failure(self.getName(), _without_own_frames(error))
         return ob.PlannerStatus(ob.PlannerStatus.ABORT)
 
     def planner_data(self) -> Any:
@@ -176,6 +177,14 @@ def _condition(ptc: Any) -> Any:
     if isinstance(ptc, ob.PlannerTerminationCondition):
         return ptc
     return ob.PlannerTerminationCondition(ptc) if callable(ptc) else ob.timedPlannerTerminationCondition(float(ptc))
+
+
+def _without_own_frames(error: ErrorType) -> ErrorType:
+    """Cut the traceback where it leaves this module: its frames hold the planner, which holds the error."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_frame.f_code.co_filename == __file__:
+        trace = trace.tb_next
+    return error.with_traceback(trace)
 
 
 def _failure(planner: str, error: Exception) -> CallbackFailed:

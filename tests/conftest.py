@@ -4,7 +4,10 @@ A test of tests/mazes/ states what it measured: `record_property("solve_rate", [
 Under pytest-xdist the properties come back to the main process with the reports.
 """
 
+import os
 from collections.abc import Iterator
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch is imported; the workers share the cores
 
 import pytest
 from scipy.stats import binomtest

@@ -6,13 +6,11 @@ All entry points share `_move`, so that one step and a batch of steps give the s
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from envs.point_kernels import FIRST_FREE, displacement
+from envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
 from envs.wall_grid import CELLS_PER_UNIT
-from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
 
-Ints = NDArray[np.int32]
 Point = tuple[float, float]
 
 CLEARANCE = 1e-6
@@ -23,7 +21,6 @@ ROUNDING = 4e-16
 
 # Places of the maze's own settings in the array `settings`, after those of `point_kernels`.
 SLIDE, CELLS = FIRST_FREE, FIRST_FREE + 1
-NUM_SETTINGS = FIRST_FREE + 2
 
 
 @njit(cache=True)
@@ -65,10 +62,10 @@ def _cell(x: float, cells: float) -> int:
 
 
 @njit(cache=True)
-def _hits_any(rectangles: Array, nearby: Ints, begin: int, end: int,
+def _hits_any(rectangles: Array, lists: IndexArray, begin: int, end: int,
               x0: float, y0: float, x1: float, y1: float) -> bool:
     for k in range(begin, end):
-        wall = rectangles[nearby[k]]
+        wall = rectangles[lists[k]]
         if hits_rectangle(x0, y0, x1, y1, wall[0], wall[1], wall[2], wall[3]):
             return True
     return False
@@ -89,26 +86,26 @@ def _entry(x0: float, y0: float, dx: float, dy: float,
 
 
 @njit(cache=True)
-def _slide(rectangles: Array, nearby: Ints, begin: int, end: int,
+def _slide(rectangles: Array, lists: IndexArray, begin: int, end: int,
            x0: float, y0: float, x1: float, y1: float) -> Point:
     """Return the last point of the step before the walls, or its start where there is no room to move."""
     dx, dy = x1 - x0, y1 - y0
     fraction = 1.0
     for k in range(begin, end):
-        wall = rectangles[nearby[k]]
+        wall = rectangles[lists[k]]
         left, bottom, right, top = wall[0], wall[1], wall[2], wall[3]
         if hits_rectangle(x0, y0, x1, y1, left, bottom, right, top):
             fraction = min(fraction, _entry(x0, y0, dx, dy, left, bottom, right, top))
     if not fraction > 0.0:
         return x0, y0
     x, y = x0 + fraction * dx, y0 + fraction * dy
-    if _hits_any(rectangles, nearby, begin, end, x0, y0, x, y):
+    if _hits_any(rectangles, lists, begin, end, x0, y0, x, y):
         return x0, y0
     return x, y
 
 
 @njit(cache=True)
-def _move(rectangles: Array, first: Ints, nearby: Ints, settings: Array,
+def _move(rectangles: Array, lists: IndexArray, settings: Array,
           x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
     """Return the next position, and whether the step hit a wall."""
     x1, y1 = x + displacement(settings, a), y + displacement(settings, b)
@@ -116,25 +113,25 @@ def _move(rectangles: Array, first: Ints, nearby: Ints, settings: Array,
         return x1, y1, False
     cells = settings[CELLS]
     cell = _cell(x, cells) * int(cells) + _cell(y, cells)
-    begin, end = first[cell], first[cell + 1]
-    if not _hits_any(rectangles, nearby, begin, end, x, y, x1, y1):
+    begin, end = lists[cell], lists[cell + 1]
+    if not _hits_any(rectangles, lists, begin, end, x, y, x1, y1):
         return x1, y1, False
     if settings[SLIDE] == 0.0:
         return x, y, True
-    x1, y1 = _slide(rectangles, nearby, begin, end, x, y, x1, y1)
+    x1, y1 = _slide(rectangles, lists, begin, end, x, y, x1, y1)
     return x1, y1, True
 
 
 @njit(cache=True)
-def step_one(rectangles: Array, first: Ints, nearby: Ints, settings: Array,
+def step_one(rectangles: Array, lists: IndexArray, settings: Array,
              x: float, y: float, a: float, b: float) -> Point:
     """Return the next position of one point as a tuple of two floats."""
-    x1, y1, _ = _move(rectangles, first, nearby, settings, x, y, a, b)
+    x1, y1, _ = _move(rectangles, lists, settings, x, y, a, b)
     return x1, y1
 
 
 @njit(cache=True)
-def move(rectangles: Array, first: Ints, nearby: Ints, settings: Array,
+def move(rectangles: Array, lists: IndexArray, settings: Array,
          states: Array, controls: Array) -> tuple[Array, BoolArray]:
     """Return the next states [B, 2] after controls [B, 2], and whether a wall was hit [B]."""
     count = states.shape[0]
@@ -142,5 +139,15 @@ def move(rectangles: Array, first: Ints, nearby: Ints, settings: Array,
     hits = np.empty(count, dtype=np.bool_)
     for k in range(count):
         after[k, 0], after[k, 1], hits[k] = _move(
-            rectangles, first, nearby, settings, states[k, 0], states[k, 1], controls[k, 0], controls[k, 1])
+            rectangles, lists, settings, states[k, 0], states[k, 1], controls[k, 0], controls[k, 1])
     return after, hits
+
+
+@njit(COMPILED_STEP, cache=True)
+def compiled_step(settings: Array, rectangles: Array, lists: IndexArray, states: Array, parent: int,
+                  controls: Array, child: int) -> tuple[float, bool, bool]:
+    """Write states[child] from states[parent] and controls[child]; return reward, terminated, success."""
+    x, y, hit = _move(rectangles, lists, settings, states[parent, 0], states[parent, 1],
+                      controls[child, 0], controls[child, 1])
+    states[child, 0], states[child, 1] = x, y
+    return outcome(settings, x, y, hit)

@@ -8,7 +8,7 @@ import numpy as np
 from envs.maze import kernels
 from envs.maze.fcl_move import move_by_fcl
 from envs.maze.layout import MazeLayout
-from envs.point_env import MAX_STEP, PointEnv
+from envs.point_env import MAX_STEP, CompiledStep, PointEnv
 from envs.wall_grid import build_wall_grid
 from envs.walls_fcl import WallsFcl
 from pbcs_ompl.core.contracts import Array, BoolArray
@@ -55,15 +55,14 @@ class MazeEnv(PointEnv):
         self.layout = _layout(size, maze_seed, layout)
         self.collision = collision
         self._fcl = WallsFcl(self.layout.rectangles)
+        self._slide = collision_response == "slide"
         size = self.layout.size
+        self._grid = build_wall_grid(self.layout.rectangles, size, MAX_STEP)
         default_goal = (0.5, 1.5) if size == 2 else (size - 0.5, size - 0.5)
         super().__init__(size, start, default_goal if goal is None else goal, wall_penalty=wall_penalty,
                          terminate_on_success=terminate_on_success, normalize_actions=normalize_actions,
-                         max_episode_steps=max(100, 20 * size * size), render_mode=render_mode)
-        self._grid = build_wall_grid(self.layout.rectangles, size, MAX_STEP)
-        self._slide = collision_response == "slide"
-        self.settings = np.append(self.settings, [self._slide, self._grid.cells])
-        assert len(self.settings) == kernels.NUM_SETTINGS
+                         max_episode_steps=max(100, 20 * size * size),
+                         own_settings=(self._slide, self._grid.cells), render_mode=render_mode)
 
     @property
     def walls(self) -> Array:
@@ -74,18 +73,23 @@ class MazeEnv(PointEnv):
         """Return the next states [B, 2] and whether a wall was hit [B]."""
         if self.collision == "fcl":
             return move_by_fcl(self._fcl, states, states + self.displacements(controls), self._slide)
-        grid = self._grid
-        return kernels.move(grid.rectangles, grid.first, grid.nearby, self.settings, states, controls)
+        return kernels.move(self._grid.rectangles, self._grid.lists, self.settings, states, controls)
 
     def step_one(self, state: list[float], control: list[float]) -> list[float]:
         """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
         if self.collision == "fcl":
             after, _ = self.move(np.array([state]), np.array([control]))
             return after[0].tolist()
-        rectangles, first, nearby, _ = self._grid
+        rectangles, lists, _ = self._grid
         x, y = state
         a, b = control
-        return [*kernels.step_one(rectangles, first, nearby, self.settings, x, y, a, b)]
+        return [*kernels.step_one(rectangles, lists, self.settings, x, y, a, b)]
+
+    def compiled_step(self) -> CompiledStep | None:
+        """Return the step as a function for compiled planners; None with collision="fcl"."""
+        if self.collision == "fcl":
+            return None
+        return kernels.compiled_step, self.settings, self._grid.rectangles, self._grid.lists
 
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, 2] are within the bounds and, by FCL, in no wall [B]."""

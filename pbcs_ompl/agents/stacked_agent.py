@@ -165,7 +165,7 @@ class StackedAgent(ABC):
         return losses
 
     def _run_updates(self, rows: Tensor, rates: Tensor) -> dict[str, np.ndarray]:
-        """Make one update for each of rows [K, S, B, W] and rates [K, ...]; return the losses [K, S] by name."""
+        """Make an update for each of rows [K, S, B, W] and rates [K, ...]; return losses [K, S] by name."""
         steps = [self._run_update(*inputs) for inputs in zip(rows.unbind(), rates.unbind(), strict=True)]
         return {name: torch.stack([step[name] for step in steps]).double().cpu().numpy() for name in steps[0]}
 

@@ -6,9 +6,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents.network_kernels import BETA_1, BETA_2
 from pbcs_ompl.agents.networks import MLP, Weights
 
-BETA_1, BETA_2, ADAM_EPSILON = 0.9, 0.999, 1e-8
+ADAM_EPSILON = 1e-8
 
 
 class TrainedNetwork:

@@ -16,7 +16,7 @@ Recipe = Callable[..., Any]
 class PlannerSpec:
     """What builds a planner: a registered name, `module:attribute`, an `ompl.base.Planner` class, a factory.
 
-    A planner class or `build` that has a parameter `seed` is given the seed of the run.
+    A planner class or `build` that has a parameter `seed` is given one.
 
     Args:
         planner: What names or is the planner.

@@ -22,6 +22,7 @@ from pbcs_ompl.core.contracts import BatchPlanner, Counter, ProgressCallback, Re
 from pbcs_ompl.core.errors import InvalidOption, PbcsError
 from pbcs_ompl.core.registry import load_environments
 from pbcs_ompl.core.run_folder import CONFIG, RESULT, RunFolder
+from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.reset_anywhere import adapt, make
 
 TRAJECTORY = "trajectory.npz"
@@ -86,7 +87,7 @@ def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
             on_progress: ProgressCallback | None) -> tuple[Trajectory | None, TreeArrays, float]:
     """Return the trajectory (None when the goal was not reached), the tree, and the seconds of the search."""
     setup, model, watch = problem.setup, problem.model, problem.watch
-    planner = spec.build(problem.space_information, seed)
+    planner = spec.build(problem.space_information, SeedTree(seed).child("planner").integer())
     if isinstance(planner, BatchPlanner):
         planner.use_model(model, watch.counter)
     setup.setPlanner(planner)

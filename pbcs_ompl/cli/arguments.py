@@ -143,7 +143,8 @@ def _compare(verb: Parser) -> None:
     _add_environment(verb)
     verb.add_argument("--seeds", type=integer(1), default=10, metavar="N", help="seeds of each planner (10)")
     _add_budget(verb, 1_000_000)
-    verb.add_argument("--jobs", type=integer(1), metavar="J", help="processes that run side by side")
+    verb.add_argument("--jobs", type=integer(1), default=1, metavar="J",
+                      help="runs side by side (1); more than there are cores makes the seconds meaningless")
     _add_out(verb)
 
 

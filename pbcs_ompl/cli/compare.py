@@ -14,11 +14,13 @@ def run(arguments: Namespace) -> int:
     """Compare, draw, report. Returns 1 when no planner solved any run."""
     names = "-".join(arguments.planners)
     out = Path(arguments.out or fresh_folder("compare", arguments.env, names, arguments.seeds))
-    budget = {} if arguments.max_transitions is None else {"max_transitions": arguments.max_transitions}
-    jobs = {} if arguments.jobs is None else {"jobs": arguments.jobs}
-    with Report("compare", count="runs", budget=len(arguments.planners) * arguments.seeds) as report:
-        comparison = compare(arguments.planners, arguments.env, env_kwargs=arguments.env_kwargs,
-                             seeds=arguments.seeds, out=out, on_progress=report, **budget, **jobs)
+    try:
+        with Report("compare", count="runs", budget=len(arguments.planners) * arguments.seeds) as report:
+            comparison = compare(arguments.planners, arguments.env, env_kwargs=arguments.env_kwargs,
+                                 seeds=arguments.seeds, max_transitions=arguments.max_transitions,
+                                 jobs=arguments.jobs, out=out, on_progress=report)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"go on with the same command and --out {out}") from None
     draw_comparison(comparison, f"{environment_words(arguments)}, {arguments.seeds} seeds", out)
     summary = comparison.summary()
     conclude(summary, _closing_lines(summary, out), as_json=arguments.json)
@@ -26,8 +28,9 @@ def run(arguments: Namespace) -> int:
 
 
 def _closing_lines(summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
-    lines = [("planner", "solved    95 % interval    transitions    seconds   (medians of the solved runs)")]
+    lines = [("planner", "solved    95 % interval    transitions    seconds   (medians)")]
     lines += [(row["planner"], _cells(row)) for row in summary["rows"]]
+    lines += [("", f"{row['planner']}: {row['reason']}") for row in summary["rows"] if row["reason"]]
     return [*lines, ("files", list_files(out)),
             ("next", f"plannerarena {summary['database']}   (pip install plannerarena)")]
 

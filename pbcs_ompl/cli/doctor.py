@@ -8,9 +8,10 @@ from importlib.metadata import PackageNotFoundError, version
 from platform import platform, python_version
 from typing import Any
 
+from pbcs_ompl.bridge.building import PlannerSpec
 from pbcs_ompl.cli.terminal import conclude
-from pbcs_ompl.core.errors import MissingDependency, PlannerUnavailable
-from pbcs_ompl.core.registry import load, load_environments, names
+from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.registry import load_environments, names
 
 NEEDED = ("pbcs-ompl", "ompl", "gymnasium", "numpy", "scipy", "numba", "python-fcl", "matplotlib", "rich")
 OPTIONAL = ("torch", "safetensors", "mujoco", "gymnasium-robotics", "stable-baselines3")
@@ -63,15 +64,31 @@ def _numbers(text: str) -> tuple[int, ...]:
 
 
 def _planners() -> dict[str, str]:
-    """Return for each registered planner "ready", or why the installed OMPL cannot build it."""
+    """Return for each registered planner "ready", or why it cannot be built here."""
+    space_information = _smallest_problem()
     states = {}
     for name in names("planner"):
         try:
-            load("planner", name)
+            PlannerSpec(name, {}).build(space_information, 0)
             states[name] = "ready"
-        except (PlannerUnavailable, MissingDependency) as error:
+        except PbcsError as error:
             states[name] = str(error)
     return states
+
+
+def _smallest_problem() -> Any:
+    """Return the space information of a problem in the plane, for planners to be built on."""
+    from ompl import base as ob
+    from ompl import control as oc
+
+    bounds = ob.RealVectorBounds(2)
+    bounds.setLow(0)
+    bounds.setHigh(1)
+    states = ob.RealVectorStateSpace(2)
+    states.setBounds(bounds)
+    controls = oc.RealVectorControlSpace(states, 2)
+    controls.setBounds(bounds)
+    return oc.SpaceInformation(states, controls)
 
 
 def _environments() -> list[str]:

@@ -12,6 +12,7 @@ from pbcs_ompl.compare.statistics import Record
 from pbcs_ompl.core.errors import PbcsError
 
 WARM_UP_TRANSITIONS = 64
+WARM_UP_SECONDS = 1.0
 _warm: set[tuple[str, str, str]] = set()
 
 
@@ -64,7 +65,7 @@ def _warm_up(job: Job) -> None:
     key = (job.planner, job.env, repr(job.env_kwargs))
     if key not in _warm:
         plan(job.env, job.planner, env_kwargs=job.env_kwargs, planner_kwargs=job.planner_kwargs,
-             max_transitions=min(WARM_UP_TRANSITIONS, job.max_transitions))
+             max_transitions=min(WARM_UP_TRANSITIONS, job.max_transitions), max_seconds=WARM_UP_SECONDS)
         _warm.add(key)
 
 

@@ -171,16 +171,21 @@ def to_toml(config: dict[str, Any]) -> str:
     lines = [f"{key} = {_toml_value(value)}" for key, value in flat.items() if value is not None]
     for name, table in tables.items():
         lines += ["", f"[{name}]"]
-        lines += [f"{json.dumps(key)} = {_toml_value(value)}" for key, value in table.items() if value is not None]
+        lines += [f"{_toml_string(key)} = {_toml_value(value)}" for key, value in table.items() if value is not None]
     return "\n".join(lines) + "\n"
 
 
 def _toml_value(value: Any) -> str:
     value = plain(value) if isinstance(value, np.ndarray | np.generic | Path) else value
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(k)} = {_toml_value(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{_toml_string(k)} = {_toml_value(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_toml_value(item) for item in value) + "]"
     if isinstance(value, float) and not np.isfinite(value):
         return "nan" if np.isnan(value) else ("inf" if value > 0 else "-inf")
-    return json.dumps(value)
+    return _toml_string(value) if isinstance(value, str) else json.dumps(value)
+
+
+def _toml_string(text: str) -> str:
+    """Quote as JSON does, without the surrogate pairs and with the one control character that TOML wants escaped."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

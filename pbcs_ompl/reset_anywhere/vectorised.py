@@ -35,5 +35,10 @@ class VectorisedModel(Model):
         """Return which states [B, D] the environment can be in [B]."""
         return self.env.is_valid(states)
 
+    def compiled_step(self) -> Any:
+        """Return what the environment offers to compiled planners: its `compiled_step()`, or None."""
+        offer = getattr(self.env, "compiled_step", None)
+        return None if offer is None else offer()
+
     def _step_one_by_transition(self, state: list[float], control: list[float]) -> list[float]:
         return self.transition(np.array([state]), np.array([control])).states[0].tolist()

@@ -17,7 +17,7 @@ SMALLEST = 2  # log2 of the rows of a new bin's slice
 CLASSES = 32  # slice sizes 2**0 .. 2**31
 START, LENGTH, SIZE = 0, 1, 2  # columns of `slices`
 BINS, POOL = 0, 1  # entries of `used`
-GROWTH = 4  # of the pool; rooms cost address space only
+GROWTH = 4  # of the arrays; rooms cost address space only
 FARTHEST = 4.6e18  # cells beyond this coordinate are one cell: int64 ends there
 
 
@@ -33,7 +33,7 @@ class BinQueue(NamedTuple):
     cells: NDArray[np.int64]
     """Integer coordinates of each bin [M, F]."""
     table: NDArray[np.int32]
-    """Hash table of bin numbers, open addressing, -1 for empty [H]."""
+    """Hash table of bin numbers plus one, open addressing, 0 for empty [H]."""
     free: NDArray[np.int32]
     """First free slice of each size, -1 for none [CLASSES]."""
     used: NDArray[np.int64]
@@ -56,11 +56,11 @@ QUEUE_TYPE = types.NamedTuple((_entries, _entries, _entries, _integers, types.in
 
 def empty_queue(num_features: int) -> BinQueue:
     """Return a queue without bins; its rooms cost no memory until they are written to."""
-    rooms, rows = 2048, 1 << 16
+    rooms, rows = 1 << 14, 1 << 16
     return BinQueue(
         pool=np.empty((rows, 3), np.int32), slices=np.empty((rooms, 3), np.int32),
         order=np.empty((rooms, 3), np.int32), cells=np.empty((rooms, num_features), np.int64),
-        table=np.full(4 * rooms, -1, np.int32), free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64))
+        table=np.zeros(4 * rooms, np.int32), free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64))
 
 
 def insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_], size: NDArray[np.float64],
@@ -101,7 +101,7 @@ def insert_one(queue: BinQueue, features: NDArray[np.float64], row: int, size: N
         scaled = np.floor(features[row, axis] / size[axis])
         cell[axis] = int(min(max(scaled, -FARTHEST), FARTHEST))
     place = find_cell(queue.cells, queue.table, cell)
-    found = np.int64(queue.table[place])
+    found = np.int64(queue.table[place]) - 1
     if found < 0:
         found = _new_bin(queue, cell, place)
         if found < 0:
@@ -122,10 +122,10 @@ def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[
         mixed = (mixed ^ np.uint64(cell[axis])) * np.uint64(0x9E3779B97F4A7C15)
         mixed ^= mixed >> np.uint64(29)
     place = np.int64(mixed & np.uint64(len(table) - 1))
-    while table[place] >= 0:
+    while table[place] > 0:
         same = True
         for axis in range(len(cell)):
-            same = same and cells[table[place], axis] == cell[axis]
+            same = same and cells[table[place] - 1, axis] == cell[axis]
         if same:
             return place
         place = (place + 1) & (len(table) - 1)
@@ -158,7 +158,7 @@ def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: int) -> int:
     queue.slices[number, START] = start
     queue.slices[number, LENGTH] = 0
     queue.slices[number, SIZE] = SMALLEST
-    queue.table[place] = number
+    queue.table[place] = number + 1
     append(queue.order, 0, number, number)
     queue.used[BINS] += 1
     return number
@@ -200,8 +200,8 @@ def _grow(queue: BinQueue) -> BinQueue:
     """Return a queue with more room of each kind that is short."""
     bins = int(queue.used[BINS])
     if bins == len(queue.slices):
-        rooms = 2 * bins
-        table = np.full(4 * rooms, -1, np.int32)
+        rooms = GROWTH * bins
+        table = np.zeros(4 * rooms, np.int32)
         cells = _enlarged(queue.cells, bins, rooms)
         _rehash(cells, table, bins)
         return queue._replace(slices=_enlarged(queue.slices, bins, rooms), cells=cells, table=table,
@@ -220,7 +220,7 @@ def _enlarged(array: np.ndarray, used: int, rows: int) -> np.ndarray:
 @njit(cache=True)
 def _rehash(cells: NDArray[np.int64], table: NDArray[np.int32], bins: int) -> None:
     for number in range(bins):
-        table[find_cell(cells, table, cells[number])] = number
+        table[find_cell(cells, table, cells[number])] = number + 1
 
 
 @njit(cache=True)

@@ -37,7 +37,7 @@ def _around(queue, number, reach, cell):
         for axis in range(axes):
             cell[axis] = queue.cells[number, axis] + rest % width - reach
             rest //= width
-        place = find_cell(queue.cells, queue.table, cell)
-        if queue.table[place] >= 0:
-            total += queue.slices[queue.table[place], LENGTH]
+        found = queue.table[find_cell(queue.cells, queue.table, cell)] - 1
+        if found >= 0:
+            total += queue.slices[found, LENGTH]
     return total

@@ -2,8 +2,8 @@
 
     python tests/benchmarks/gradient_step.py [--update auto|eager|compiled] [--rounds 9]
 
-Both update actor, critic and targets from a full replay buffer with the same networks, mini-batches of 100 and
-learning rates. Ratios of medians are what counts; rounds of both alternate, so that both see the same noise.
+Both update actor, critic and targets from a full replay buffer with the same networks, mini-batches of 100,
+and learning rates. Ratios of medians are what counts; rounds alternate, so that both see the same noise.
 """
 
 import argparse
@@ -51,17 +51,16 @@ def ours(hidden: tuple[int, ...], seeds: int, compile: Compile) -> Callable[[int
 
 
 def theirs(hidden: tuple[int, ...]) -> Callable[[int], object]:
-    model = TheirDDPG("MlpPolicy", Plane(), policy_kwargs={"net_arch": list(hidden)}, batch_size=BATCH, gamma=0.9,
-                      learning_rate=1e-3, tau=0.005, buffer_size=FILL, device="cpu", seed=0)
+    model = TheirDDPG("MlpPolicy", Plane(), policy_kwargs={"net_arch": list(hidden)}, batch_size=BATCH,
+                      gamma=0.9, learning_rate=1e-3, tau=0.005, buffer_size=FILL, device="cpu", seed=0)
     model.set_logger(configure(format_strings=[]))
-    observations, actions, rewards, following, terminals = transitions(FILL)
-    for row in range(FILL):
-        model.replay_buffer.add(observations[row], following[row], actions[row], rewards[row], terminals[row], [{}])
+    for observation, action, reward, following, terminal in zip(*transitions(FILL), strict=True):
+        model.replay_buffer.add(observation, following, action, reward, terminal, [{}])
     return lambda count: model.train(count, BATCH)
 
 
 def microseconds(rows: list[tuple[Callable[[int], object], int]], rounds: int) -> list[float]:
-    """Return the median time of one update of each (train, updates in a round), after one round to warm up."""
+    """Return the median time of one update of each (train, updates in a round), after a round to warm up."""
     times: list[list[float]] = [[] for _ in rows]
     for _ in range(rounds + 1):
         for (train, count), into in zip(rows, times, strict=True):
@@ -81,10 +80,11 @@ def main() -> None:
         count = 200 if max(hidden) <= 64 else 40
         rows = [(ours(hidden, 1, COMPILE[options.update]), count), (theirs(hidden), count)]
         mine, other = microseconds(rows, options.rounds)
-        print(f"{hidden}, one thread: {mine:.0f} us, stable-baselines3 {other:.0f} us: {other / mine:.1f} times faster "
-              f"(bar {bar:g})", flush=True)
+        print(f"{hidden}, one thread: {mine:.0f} us, stable-baselines3 {other:.0f} us: "
+              f"{other / mine:.1f} times faster (bar {bar:g})", flush=True)
     torch.set_num_threads(2)
-    stack, other = microseconds([(ours((64, 64), 32, COMPILE[options.update]), 20), (theirs((64, 64)), 100)], options.rounds)
+    rows = [(ours((64, 64), 32, COMPILE[options.update]), 20), (theirs((64, 64)), 100)]
+    stack, other = microseconds(rows, options.rounds)
     print(f"(64, 64), 32 seeds, two threads: {stack / 32:.0f} us a seed, stable-baselines3 {other:.0f} us: "
           f"{other / stack * 32:.1f} times faster (target 8)")
 

@@ -114,7 +114,7 @@ def test_budget_ends_an_unreachable_goal_and_the_tree_is_saved(square, tmp_path)
 def test_time_ends_too(square):
     result = plan(square(goal=9.0), oc.KPIECE1, max_seconds=0.1, max_transitions=10**9)
     assert not result.solved
-    assert result.seconds >= 0.1
+    assert 0 < result.transitions < 10**9
 
 
 def test_no_node_comes_from_a_refused_step(square):
@@ -125,9 +125,9 @@ def test_no_node_comes_from_a_refused_step(square):
         assert np.array_equal(tree.states[children, 2], tree.states[tree.parents[children], 2] + 1)
 
 
-@pytest.mark.parametrize("planner", ["Ex", *STOCK])
+@pytest.mark.parametrize("planner", ["Ex", "RRT", *STOCK])
 def test_equal_seeds_give_equal_results(planner):
-    first, second, other = (plan(MAZE, planner, env_kwargs={"size": 3}, seed=seed) for seed in (4, 4, 5))
+    first, second, other = (plan(MAZE, planner, env_kwargs={"size": 3}, seed=seed) for seed in (0, 0, 1))
     assert first.trajectory.states.tobytes() == second.trajectory.states.tobytes()
     assert (first.transitions, first.nodes) == (second.transitions, second.nodes)
     assert first.trajectory.states.tobytes() != other.trajectory.states.tobytes()
@@ -293,7 +293,7 @@ main(sys.argv[1])
 """
 
 
-@pytest.mark.parametrize("planner", ["Ex", "ompl.control:KPIECE1"])
+@pytest.mark.parametrize("planner", ["Ex", "KPIECE1"])
 def test_memory_stays_flat_over_200_plans(planner):
     command = [sys.executable, "-c", MEMORY, planner]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -35,24 +35,27 @@ def test_warm_workers_give_the_results_of_a_fresh_process(tmp_path):
         alone = plan(MAZE, record["planner"], env_kwargs={"size": 3}, seed=record["seed"])
         mine = {key: record[key] for key in ("solved", "transitions", "nodes", "path_length", "replay_ok")}
         assert mine == {key: alone.summary()[key] for key in mine}
-    assert [(r["planner"], r["seed"]) for r in comparison.runs] == [(p, s) for p in (RRT, KPIECE1) for s in (3, 1)]
+    order = [(record["planner"], record["seed"]) for record in comparison.runs]
+    assert order == [(RRT, 3), (RRT, 1), (KPIECE1, 3), (KPIECE1, 1)]
     assert [list(row) for row in comparison.rows] == [ROW, ROW]
     assert json.loads((tmp_path / "out" / "result.json").read_text()) == comparison.summary()
     assert comparison.summary()["database"] == str(tmp_path / "out" / "comparison.db")
 
 
 def test_failing_planners_are_recorded_and_the_others_go_on(misbehaving, tmp_path):
-    names = ["misbehaving:Deadly", RRT, "misbehaving:Broken"]
-    comparison = compare(names, MAZE, env_kwargs={"size": 2}, seeds=2, jobs=2, out=tmp_path / "out")
-    deadly, rrt, broken = comparison.rows
-    assert (rrt["solved"], deadly["solved"], broken["solved"]) == (2, 0, 0)
+    names = ["misbehaving:Deadly", RRT, "misbehaving:Broken", "SST"]
+    comparison = compare(names, MAZE, env_kwargs={"size": 2}, seeds=1, jobs=2, out=tmp_path / "out")
+    deadly, rrt, broken, sst = comparison.rows
+    assert [row["solved"] for row in comparison.rows] == [0, 1, 0, 0]
+    assert rrt["reason"] is None
     assert "the process died" in deadly["reason"]
     assert "RuntimeError: this planner is broken" in broken["reason"]
+    assert "cannot build SST" in sst["reason"]
     assert deadly["transitions_median"] is None
     records = [json.loads(path.read_text()) for path in sorted((tmp_path / "out" / "runs").iterdir())]
-    assert len(records) == 6
+    assert len(records) == 4
     with sqlite3.connect(tmp_path / "out" / "comparison.db") as database:
-        assert database.execute("SELECT count(*) FROM runs WHERE status = 7").fetchone() == (4,)
+        assert database.execute("SELECT count(*) FROM runs WHERE status = 7").fetchone() == (3,)
 
 
 def test_planner_that_cannot_be_loaded_is_recorded_without_a_process(monkeypatch):
@@ -72,7 +75,7 @@ def test_killed_comparison_resumes(misbehaving, tmp_path):
     """A process is killed in its second run; the same call makes only what is missing."""
     out, told = tmp_path / "out", tmp_path / "told"
     settings = {"planners": [RRT, "misbehaving:Waiting"], "env": MAZE, "env_kwargs": {"size": 2}, "seeds": 1,
-                "planner_kwargs": {"misbehaving:Waiting": {"told": str(told)}}, "max_seconds": 2.0,
+                "planner_kwargs": {"misbehaving:Waiting": {"told": str(told)}}, "max_seconds": 3.0,
                 "out": str(out)}
     program = ("import json, sys\nfrom pbcs_ompl.compare.compare import compare\n"
                "if __name__ == '__main__':\n    compare(**json.loads(sys.argv[1]))\n")

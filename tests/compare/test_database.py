@@ -10,8 +10,8 @@ from pbcs_ompl.core.errors import RunFolderError
 
 CONFIG = {"env": "pbcs/Maze-v0", "planners": ["Ex", "RRT"], "seeds": [0, 1], "max_transitions": 100,
           "max_seconds": None, "planner_kwargs": {"Ex": {"bin_size": 0.1}}, "versions": {"ompl": "2.0.1"}}
-EXPERIMENTS = ["id", "name", "totaltime", "timelimit", "memorylimit", "runcount", "version", "hostname", "cpuinfo",
-               "date", "seed", "setup"]
+EXPERIMENTS = ["id", "name", "totaltime", "timelimit", "memorylimit", "runcount", "version", "hostname",
+               "cpuinfo", "date", "seed", "setup"]
 
 
 def solved(planner, seed):
@@ -48,11 +48,12 @@ def test_runs_belong_to_their_planner(database):
              "JOIN plannerConfigs p ON p.id = r.plannerid JOIN experiments x ON x.id = r.experimentid "
              "JOIN enums e ON e.name = 'status' AND e.value = r.status ORDER BY r.id")
     assert database.execute(query).fetchall() == [
-        ("Ex", 0, 1, 50, "Exact solution"), ("Ex", 1, 1, 50, "Exact solution"), ("RRT", 0, 1, 50, "Exact solution"),
-        ("RRT", 1, 0, None, "Crash")]
+        ("Ex", 0, 1, 50, "Exact solution"), ("Ex", 1, 1, 50, "Exact solution"),
+        ("RRT", 0, 1, 50, "Exact solution"), ("RRT", 1, 0, None, "Crash")]
     assert database.execute("SELECT version, runcount, totaltime FROM experiments").fetchall() == \
         [("OMPL 2.0.1", 2, 1.5)]
-    assert database.execute("SELECT settings FROM plannerConfigs").fetchall() == [('{"bin_size": 0.1}',), ("{}",)]
+    settings = database.execute("SELECT settings FROM plannerConfigs").fetchall()
+    assert settings == [('{"bin_size": 0.1}',), ("{}",)]
 
 
 def test_ompls_own_views_work(database, tmp_path):

@@ -23,7 +23,7 @@ def test_a_wall_that_is_touched_is_listed(x: float, y: float, a: float, b: float
     grid = build_wall_grid(walls, 3.0, REACH)
     i, j = (min(int(v * CELLS_PER_UNIT), grid.cells - 1) for v in (x, y))
     cell = i * grid.cells + j
-    listed = set(grid.nearby[grid.first[cell]:grid.first[cell + 1]].tolist())
+    listed = set(grid.lists[grid.lists[cell]:grid.lists[cell + 1]].tolist())
     touched = {k for k, wall in enumerate(walls) if kernels.hits_rectangle(x, y, x + a, y + b, *wall)}
     assert touched <= listed
 
@@ -31,4 +31,6 @@ def test_a_wall_that_is_touched_is_listed(x: float, y: float, a: float, b: float
 @pytest.mark.parametrize("extent", [2.0, 50.0])
 def test_far_walls_are_not_listed(extent: float) -> None:
     grid = build_wall_grid(np.array([[0.0, 0.0, 0.1, 0.1]]), extent, REACH)
-    assert grid.first[-1] == len(grid.nearby) == 4  # the wall and its reach meet 2 x 2 cells
+    begins, listed = grid.lists[:grid.cells**2 + 1], grid.lists[grid.cells**2 + 1:]
+    assert listed.tolist() == [0] * 4  # the wall and its reach meet 2 x 2 cells
+    assert begins[-1] == len(grid.lists)

@@ -1,0 +1,257 @@
+"""DDPG: its losses by hand, stacks against separate agents, every way of running it, saving, and learning."""
+
+import numpy as np
+import pytest
+import torch
+
+from pbcs_ompl.agents import DDPG, DDPGSettings, NonFiniteData
+from pbcs_ompl.agents.update import Compile
+from pbcs_ompl.core.errors import InvalidOption, Mismatch
+
+SMALL = DDPGSettings(hidden=(24, 20), batch_size=32)
+LOW, HIGH = [-1.0, 0.0], [0.5, 10.0]
+
+
+def make(*seeds: int, compile: Compile = "auto", settings: DDPGSettings = SMALL) -> DDPG:
+    return DDPG(3, LOW, HIGH, settings=settings, seeds=seeds, compile=compile)
+
+
+def data(seed: int, count: int = 200) -> list[np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return [rng.normal(size=(count, 3)), rng.uniform(LOW, HIGH, (count, 2)), rng.normal(size=count),
+            rng.normal(size=(count, 3)), rng.random(count) < 0.2]
+
+
+def fill(agent: DDPG, *seeds: int) -> DDPG:
+    agent.remember(*(np.stack(field) for field in zip(*(data(seed) for seed in seeds), strict=True)))
+    return agent
+
+
+def weights(agent: DDPG, seed_index: int) -> np.ndarray:
+    """All of one seed's parameters, targets and moments in a row."""
+    parts = []
+    for net in agent._networks.values():
+        for flat in net.tensors().values():
+            for layer in net.network.split(flat):
+                norm = () if layer.norm is None else layer.norm
+                parts += [part[seed_index].ravel() for part in (layer.weight, layer.bias, *norm)]
+    return torch.cat(parts).numpy()
+
+
+def run_numpy(layers: tuple, inputs: np.ndarray) -> np.ndarray:
+    for weight, bias in layers[:-1]:
+        inputs = np.maximum(inputs @ weight + bias, 0.0)
+    return inputs @ layers[-1][0] + layers[-1][1]
+
+
+@pytest.mark.parametrize("compile", ["auto", False])
+def test_first_losses_equal_the_equations_row_by_row(compile: Compile) -> None:
+    """Eqs. 1.2 and 1.3 of [Matheron2020], in float64; targets equal the networks before the first update."""
+    agent = fill(make(3, compile=compile), 0)
+    rows = agent.clone()._replay.sample(1, SMALL.batch_size)[0, 0].double().numpy()
+    actor, critic = ([(layer.weight[0].double().numpy(), layer.bias[0, 0].double().numpy())
+                      for layer in net.weights.layers] for net in agent._networks.values())
+    half, centre = (np.array(HIGH) - LOW) / 2, (np.array(HIGH) + LOW) / 2
+    errors = []
+    for row in rows:
+        state, action, reward, goes_on, following = row[:3], row[3:5], row[5], row[6], row[7:]
+        next_action = centre + half * np.tanh(run_numpy(actor, following))
+        target = reward + SMALL.discount * goes_on * run_numpy(critic, np.r_[following, next_action])[0]
+        errors.append(run_numpy(critic, np.r_[state, action])[0] - target)
+    losses = agent.train(1)
+    np.testing.assert_allclose(losses["critic_loss"], np.mean(np.square(errors)), rtol=1e-5)
+    updated = [(layer.weight[0].double().numpy(), layer.bias[0, 0].double().numpy())
+               for layer in agent._networks["critic"].weights.layers]
+    values = [run_numpy(updated, np.r_[row[:3], centre + half * np.tanh(run_numpy(actor, row[:3]))])[0]
+              for row in rows]
+    np.testing.assert_allclose(losses["actor_loss"], -np.mean(values), rtol=1e-4)
+
+
+def test_first_gradients_equal_autograd() -> None:
+    agent = fill(make(3, 4, compile=False), 0, 1)
+    rows = agent._replay.sample(1, SMALL.batch_size)[0]
+    agent._critic_gradient(rows)
+    agent._actor_gradient(rows)
+    batch, nets = agent._replay.unpack(rows), agent._networks
+    leaves = {name: net.weights.flat.clone().requires_grad_() for name, net in nets.items()}
+
+    def run(name: str, flat: torch.Tensor, inputs: torch.Tensor) -> torch.Tensor:
+        *hidden, last = nets[name].network.split(flat)
+        for layer in hidden:
+            inputs = torch.relu(inputs @ layer.weight + layer.bias)
+        return inputs @ last.weight + last.bias
+
+    def act(flat: torch.Tensor, observations: torch.Tensor) -> torch.Tensor:
+        return agent._centre + agent._half * torch.tanh(run("actor", flat, observations))
+
+    after = batch.next_observations
+    next_pairs = torch.cat((after, act(nets["actor"].target.flat, after)), 2)
+    following = run("critic", nets["critic"].target.flat, next_pairs)
+    target = batch.rewards + SMALL.discount * batch.continues * following
+    critic_loss = (run("critic", leaves["critic"], batch.pairs) - target).square().mean((1, 2)).sum()
+    pairs = torch.cat((batch.observations, act(leaves["actor"], batch.observations)), 2)
+    actor_loss = -run("critic", nets["critic"].weights.flat, pairs).mean((1, 2)).sum()
+    for name, loss in (("critic", critic_loss), ("actor", actor_loss)):
+        expected = torch.autograd.grad(loss, leaves[name])[0]
+        torch.testing.assert_close(nets[name].gradient.flat, expected, rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("layer_norm", [False, True])
+def test_a_stack_equals_separate_agents(layer_norm: bool) -> None:
+    settings = DDPGSettings(hidden=(24, 20), batch_size=32, layer_norm=layer_norm)
+    stack = fill(make(5, 6, 7, settings=settings), 0, 1, 2)
+    losses = stack.train(200)
+    for index, seed in enumerate((5, 6, 7)):
+        alone = fill(make(seed, settings=settings), index)
+        own = alone.train(200)
+        np.testing.assert_allclose(weights(stack, index), weights(alone, 0), atol=1e-5)
+        np.testing.assert_allclose(losses["critic_loss"][index], own["critic_loss"][0], rtol=1e-4)
+
+
+@pytest.mark.parametrize("compile", ["auto", False])
+def test_changing_one_seed_leaves_the_others_bit_equal(compile: Compile) -> None:
+    first = fill(make(5, 6, 7, compile=compile), 0, 1, 2)
+    second = fill(make(5, 8, 7, compile=compile), 0, 9, 2)
+    first.train(50)
+    second.train(50)
+    assert np.array_equal(weights(first, 0), weights(second, 0))
+    assert np.array_equal(weights(first, 2), weights(second, 2))
+    assert not np.array_equal(weights(first, 1), weights(second, 1))
+
+
+def test_the_kernel_equals_eager_torch() -> None:
+    kernel, eager = fill(make(1, 2), 3, 4), fill(make(1, 2, compile=False), 3, 4)
+    mine, theirs = kernel.train(200), eager.train(200)
+    for index in range(2):
+        np.testing.assert_allclose(weights(kernel, index), weights(eager, index), atol=1e-5)
+    for name in mine:
+        np.testing.assert_allclose(mine[name], theirs[name], rtol=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("layer_norm", [False, True])
+def test_torch_compile_equals_eager_torch(layer_norm: bool) -> None:
+    settings = DDPGSettings(hidden=(24, 20), batch_size=32, layer_norm=layer_norm)
+    compiled = fill(make(1, 2, compile=True, settings=settings), 3, 4)
+    eager = fill(make(1, 2, compile=False, settings=settings), 3, 4)
+    compiled.train(200)
+    eager.train(200)
+    np.testing.assert_allclose(weights(compiled, 1), weights(eager, 1), atol=1e-5)
+
+
+def test_a_failed_compilation_goes_on_eagerly_with_one_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise torch._dynamo.exc.BackendCompilerFailed(fail, RuntimeError("no compiler"), None)
+
+    monkeypatch.setattr(torch, "compile", lambda function, **_: fail)
+    agent, eager = fill(make(1, compile=True), 3), fill(make(1, compile=False), 3)
+    with pytest.warns(RuntimeWarning, match="going on without it") as caught:
+        agent.train(5)
+    assert len(caught) == 1
+    eager.train(5)
+    assert np.array_equal(weights(agent, 0), weights(eager, 0))
+
+
+@pytest.mark.parametrize("compile", ["auto", False])
+def test_saved_and_loaded_agents_go_on_bit_for_bit(compile: Compile) -> None:
+    first = fill(make(1, 2, compile=compile), 3, 4)
+    first.train(30)
+    second = make(1, 2, compile=compile)
+    second.load_state_dict({name: array.copy() for name, array in first.state_dict().items()})
+    for agent in (first, second):
+        agent.train(7)
+        fill(agent, 5, 6)
+        agent.train(20)
+    mine, theirs = first.state_dict(), second.state_dict()
+    assert mine.keys() == theirs.keys()
+    for name in mine:
+        assert np.array_equal(mine[name], theirs[name]), name
+    assert first.num_updates == 57
+
+
+def test_updates_do_not_depend_on_how_many_are_asked_for_at_once() -> None:
+    first, second = fill(make(1), 3), fill(make(1), 3)
+    first.train(40)
+    for count in (1, 9, 30):
+        second.train(count)
+    assert np.array_equal(weights(first, 0), weights(second, 0))
+
+
+def test_a_state_of_another_agent_is_refused() -> None:
+    agent = fill(make(1), 3)
+    state = agent.state_dict()
+    with pytest.raises(Mismatch, match="seeds"):
+        make(2).load_state_dict(state)
+    with pytest.raises(Mismatch, match="other settings"):
+        make(1, settings=DDPGSettings(hidden=(8,))).load_state_dict(state)
+    with pytest.raises(Mismatch, match="missing"):
+        make(1).load_state_dict({name: state[name] for name in state if name != "critic/mean"})
+
+
+def test_actions_stay_in_an_asymmetric_box_and_reach_its_corners() -> None:
+    agent = make(1, 2)
+    actor = agent._networks["actor"]
+    for sign, corner in ((1.0, HIGH), (-1.0, LOW)):
+        actor.weights.layers[-1].bias.fill_(40.0 * sign)
+        observations = np.random.default_rng(0).normal(size=(2, 30, 3))
+        actions = agent.act(observations)
+        assert actions.dtype == np.float64
+        assert ((actions >= LOW) & (actions <= HIGH)).all()
+        np.testing.assert_allclose(actions, np.broadcast_to(corner, actions.shape), atol=1e-5)
+        alone = agent.policy().act(observations[0])
+        assert ((alone >= LOW) & (alone <= HIGH)).all()
+
+
+def test_bad_transitions_are_refused_and_nothing_is_kept() -> None:
+    agent = make(1)
+    observations, actions, rewards, following, terminals = (field[None] for field in data(0, 10))
+    with pytest.raises(InvalidOption, match=r"actions have the shape \(1, 10, 1\), expected \(1, 10, 2\)"):
+        agent.remember(observations, actions[..., :1], rewards, following, terminals)
+    rewards[0, 3] = np.nan
+    with pytest.raises(NonFiniteData, match="rewards"):
+        agent.remember(observations, actions, rewards, following, terminals)
+    mask = np.isfinite(rewards)
+    agent.remember(observations, actions, rewards, following, terminals, mask)
+    assert agent.replay_sizes.tolist() == [9]
+    agent.forget()
+    with pytest.raises(InvalidOption, match="no transitions"):
+        agent.train(1)
+
+
+@pytest.mark.parametrize("compile", ["auto", False])
+def test_a_nan_in_a_loss_names_seed_and_update(compile: Compile) -> None:
+    agent = fill(make(8, 9, compile=compile), 0, 1)
+    agent.train(3)
+    agent._networks["critic"].weights.layers[0].weight[1, 0, 0] = float("nan")
+    with pytest.raises(NonFiniteData, match="critic_loss of seed 9 is nan in update 4"):
+        agent.train(10)
+
+
+def test_it_solves_a_bandit_and_values_it() -> None:
+    """One step, reward -(a - 0.3)^2: the actor must find 0.3, the critic the rewards."""
+    agent = DDPG(1, [-1.0], [1.0], settings=DDPGSettings(hidden=(32, 32)), seeds=(0, 1, 2))
+    actions = np.random.default_rng(0).uniform(-1, 1, (3, 2000, 1))
+    zeros = np.zeros((3, 2000, 1))
+    agent.remember(zeros, actions, -np.square(actions[..., 0] - 0.3), zeros, np.ones((3, 2000)))
+    agent.train(2000)
+    np.testing.assert_allclose(agent.act(np.zeros((3, 1, 1))), 0.3, atol=0.1)
+    probe = np.linspace(-0.9, 0.9, 7)[None, :, None].repeat(3, axis=0)
+    values = agent.value(np.zeros((3, 7, 1)), probe)
+    np.testing.assert_allclose(values, -np.square(probe[..., 0] - 0.3), atol=0.1)
+
+
+def test_it_learns_to_reach_a_point_on_a_line() -> None:
+    """Steps of at most 0.2 on [-1, 1]; reward -1 a step until |x| < 0.1: at most six steps from anywhere."""
+    agent = DDPG(1, [-0.2], [0.2], settings=DDPGSettings(hidden=(32, 32)), seeds=(0, 1))
+    rng = np.random.default_rng(1)
+    before, actions = rng.uniform(-1, 1, (2, 3000, 1)), rng.uniform(-0.2, 0.2, (2, 3000, 1))
+    after = np.clip(before + actions, -1, 1)
+    arrived = np.abs(after[..., 0]) < 0.1
+    agent.remember(before, actions, np.where(arrived, 0.0, -1.0), after, arrived)
+    agent.train(4000)
+    places = np.linspace(-1, 1, 21)[None, :, None].repeat(2, axis=0)
+    done = np.abs(places[..., 0]) < 0.1
+    for _ in range(8):
+        places = np.where(done[..., None], places, np.clip(places + agent.act(places), -1, 1))
+        done |= np.abs(places[..., 0]) < 0.1
+    assert done.mean() > 0.9

@@ -1,0 +1,77 @@
+"""Presets, settings out of range, devices that are not there, and epsilon-greedy noise."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import torch
+
+from pbcs_ompl.agents import DDPG, DDPGSettings, epsilon_greedy, preset_names
+from pbcs_ompl.core.errors import InvalidOption, UnknownName, UnsupportedSpace
+
+
+def test_presets_hold_what_the_sources_say() -> None:
+    assert {"fast", "thesis", "thesis-chapter-4"} <= set(preset_names())
+    thesis, chapter_4 = DDPGSettings.from_preset("thesis"), DDPGSettings.from_preset("thesis-chapter-4")
+    assert thesis == DDPGSettings((400, 300), False, 1e-3, 1e-3, 100, 0.99, 0.995, 1_000_000)
+    assert chapter_4 == DDPGSettings((64, 64), True, 1e-4, 1e-3, 64, 0.99, 0.99, 1_000_000)
+    assert DDPGSettings.from_preset("fast") == DDPGSettings()
+    assert DDPGSettings.from_preset("thesis", discount=0.9).discount == 0.9
+
+
+def test_wrong_names_are_answered_with_the_closest() -> None:
+    with pytest.raises(UnknownName, match="'thesis'"):
+        DDPGSettings.from_preset("thesys")
+    with pytest.raises(InvalidOption, match="'discount'"):
+        DDPGSettings.from_preset("fast", dicsount=0.9)
+
+
+@pytest.mark.parametrize("wrong", [
+    {"discount": 1.0}, {"discount": -0.1}, {"discount": float("nan")}, {"polyak": 1.5}, {"batch_size": 0},
+    {"hidden": ()}, {"hidden": (64, 0)}, {"replay_capacity": 0}, {"actor_learning_rate": 0.0},
+    {"critic_learning_rate": -1.0},
+])
+def test_settings_out_of_range_are_named(wrong: dict) -> None:
+    with pytest.raises(InvalidOption, match=next(iter(wrong))):
+        DDPGSettings(**wrong)
+
+
+def test_wrong_spaces_devices_and_options_are_refused() -> None:
+    with pytest.raises(UnsupportedSpace, match="RescaleAction"):
+        DDPG(2, [-1.0], [np.inf])
+    with pytest.raises(UnsupportedSpace, match="low < high"):
+        DDPG(2, [1.0], [1.0])
+    with pytest.raises(InvalidOption, match="compile"):
+        DDPG(2, [-1.0], [1.0], compile="yes")  # type: ignore[arg-type]
+    with pytest.raises(InvalidOption, match="device"):
+        DDPG(2, [-1.0], [1.0], device="abacus")
+    if not torch.cuda.is_available():
+        with pytest.raises(InvalidOption, match="no CUDA device"):
+            DDPG(2, [-1.0], [1.0], device="cuda")
+
+
+@pytest.mark.parametrize("library", ["torch", "safetensors"])
+def test_a_missing_library_is_named_with_the_remedy(library: str) -> None:
+    code = (f"import sys; sys.modules[{library!r}] = None\n"
+            "from pbcs_ompl.core.errors import MissingDependency\n"
+            "try:\n    import pbcs_ompl.agents\nexcept MissingDependency as error:\n    print(error)")
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert library in answer.stdout
+    assert 'pip install "pbcs-ompl[rl]"' in answer.stdout
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.3, 1.0])
+def test_epsilon_greedy_replaces_that_share_by_uniform_actions(epsilon: float) -> None:
+    low, high = np.array([-1.0, 2.0]), np.array([0.0, 5.0])
+    actions = np.broadcast_to([-0.25, 3.0], (3, 4000, 2))
+    noisy = epsilon_greedy(actions, epsilon, low, high, np.random.default_rng(0))
+    changed = (noisy != actions).any(axis=-1)
+    assert changed.mean() == pytest.approx(epsilon, abs=0.02)
+    if epsilon:
+        np.testing.assert_allclose(noisy[changed].mean(axis=0), (low + high) / 2, atol=0.06)
+        np.testing.assert_allclose(noisy[changed].std(axis=0), (high - low) / 12**0.5, atol=0.06)
+    assert (noisy >= low).all()
+    assert (noisy <= high).all()
+    with pytest.raises(InvalidOption, match="probability"):
+        epsilon_greedy(actions, 1.1, low, high, np.random.default_rng(0))

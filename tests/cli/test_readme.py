@@ -1,0 +1,81 @@
+"""What the README and the docs tell people to type works as it stands there."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from pbcs_ompl.cli import main
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+README = PAGES[0].read_text()
+
+
+def blocks(text, language):
+    """Return the fenced blocks of one language ("" for commands)."""
+    fences = re.findall(r"^```(\w*)\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+    return [block for name, block in fences if name == language]
+
+
+def commands(text):
+    lines = "\n".join(blocks(text, "")).replace("\\\n", " ").splitlines()
+    return [line for line in lines if line.startswith("pbcs ")]
+
+
+SNIPPETS = [pytest.param(code, id=f"{page.name}-{number}")
+            for page in PAGES for number, code in enumerate(blocks(page.read_text(), "python"))]
+ELSEWHERE = [line for page in PAGES[1:] for line in commands(page.read_text())]
+
+
+@pytest.mark.parametrize("code", SNIPPETS)
+def test_python_works_when_pasted(code, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    small = re.sub(r'\{"size": \d+, "maze_seed": \d+\}', '{"size": 2}', code)  # learnt in seconds
+    exec(compile(small, "snippet", "exec"), {"__name__": "__main__"})
+
+
+def test_the_readmes_command_lines_work_one_after_the_other(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    for line in commands(README):
+        small = re.sub(r'"size": \d+, "maze_seed": \d+', '"size": 2', line).replace("--seeds 10", "--seeds 2")
+        assert main(shlex.split(small)[1:]) == 0, line
+        assert "Traceback" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("line", ELSEWHERE)
+def test_command_lines_of_the_docs_work(line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    assert main(shlex.split(line)[1:]) == 0
+
+
+def test_make_targets_exist():
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
+    for page in PAGES:
+        named = re.findall(r"(?:^|`)make ([a-z]+)", page.read_text(), flags=re.MULTILINE)
+        assert set(named) <= targets, page.name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
+        assert target.startswith("http") or (page.parent / target).exists(), target
+
+
+def test_the_first_forty_lines_hold_what_a_visitor_needs():
+    head = "\n".join(README.splitlines()[:40])
+    assert head.count("![") == 1
+    assert "make demo" in head
+    assert "make test" in head
+    assert "```python" in head
+    assert head.count("```") == 4
+
+
+def test_every_folder_of_the_overview_exists():
+    tree = next(block for block in blocks(README, "") if "reset_anywhere/" in block)
+    parents = {"core", "reset_anywhere", "bridge", "agents", "skills", "compare", "figures", "cli"}
+    for name in re.findall(r"^\s*(\w+)/", tree, flags=re.MULTILINE):
+        assert (ROOT / ("pbcs_ompl" if name in parents else "") / name).is_dir(), name

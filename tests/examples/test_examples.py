@@ -1,0 +1,37 @@
+"""Every example runs as its user would run it, in an empty folder, and stays short."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = {
+    "plan_a_maze.py": ([], "it replays exactly: True"),
+    "compare_planners.py": (["2"], "KPIECE1"),
+    "train_a_skill_chain.py": ([], "success with 0% random actions: 100%"),
+    "own_planner.py": ([], "Nearest: solved True"),
+    "own_environment.py": ([], "replays exactly: True"),
+    "plain_ompl_car.py": ([], "OMPL's own check: True"),
+    "look_at_a_critic.py": (["200"], "critic.png"),
+}
+
+
+def test_every_example_is_tested():
+    assert {path.name for path in (ROOT / "examples").glob("*.py")} == set(EXAMPLES)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_example_runs(name, tmp_path):
+    words, expected = EXAMPLES[name]
+    command = [sys.executable, ROOT / "examples" / name, *words]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert expected in run.stdout
+    assert "Traceback" not in run.stderr
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_example_is_short(name):
+    assert len((ROOT / "examples" / name).read_text().splitlines()) < 100

@@ -1,0 +1,113 @@
+"""A chain acts as one policy, and what is saved is what is loaded."""
+
+import json
+
+import numpy as np
+import pytest
+
+from pbcs_ompl.agents.policy import Policy
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
+from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.skills.chain import Skill, SkillChain
+from pbcs_ompl.skills.evaluation import evaluate
+from pbcs_ompl.skills.goals import Ball, Target
+from pbcs_ompl.skills.policy import Frame, SkillPolicy
+
+MODEL = make("pbcs/Maze-v0", {"size": 2})
+TURNS = [[0.5, 0.5], [1.5, 0.5], [1.5, 1.5]]
+ENDS = [*TURNS[1:], [0.5, 1.5]]
+
+
+def towards(point):
+    """A policy that walks straight to `point`: one linear layer and the tanh."""
+    actor = Policy(((-4 * np.eye(2, dtype=np.float32), np.zeros(2, np.float32)),), MODEL.action_low, MODEL.action_high)
+    return SkillPolicy(actor, Frame(np.array(point), np.ones(2)))
+
+
+def round_the_corner():
+    """The hand-made chain of the 2x2 maze: right, up, left."""
+    goals = [Ball(np.array(ENDS[0]), 0.15), Ball(np.array(ENDS[1]), 0.15), Target(MODEL.goal_threshold)]
+    skills = tuple(Skill(towards(end), Ball(np.array(start), 0.15), goal)
+                   for start, end, goal in zip(TURNS, ENDS, goals, strict=True))
+    return SkillChain(skills, MODEL.env_id, MODEL.env_kwargs, 200)
+
+
+def test_the_chain_walks_round_the_corners():
+    states = round_the_corner().rollout(MODEL, MODEL.initial_state(0))
+    assert MODEL.goal_distance(states[-1:])[0] < MODEL.goal_threshold
+    assert len(states) < 60
+
+
+def test_a_batch_of_executions_equals_single_ones():
+    chain, rng = round_the_corner(), np.random.default_rng(0)
+    starts = rng.uniform(0.3, 0.7, (12, 2))
+    together = chain.rollouts(MODEL, starts)
+    for index, start in enumerate(starts):
+        alone = chain.rollouts(MODEL, start[None])
+        assert alone.success[0] == together.success[index]
+        assert alone.steps[0] == together.steps[index]
+    np.testing.assert_array_equal(together.states, chain.rollout(MODEL, starts[0]))
+
+
+def test_the_controller_never_goes_back_and_may_skip():
+    controller = round_the_corner().controller(MODEL)
+    for state, expected in ((TURNS[0], 0), (TURNS[2], 2), (TURNS[1], 2), (TURNS[0], 2)):
+        controller.act(np.array([state]))
+        assert controller.current.tolist() == [expected]
+
+
+def test_the_time_limit_ends_an_execution():
+    rollouts = round_the_corner().rollouts(MODEL, np.array([[0.5, 0.5]]), max_steps=5)
+    assert not rollouts.success[0]
+    assert rollouts.steps[0] == 5
+    assert len(rollouts.states) == 6
+
+
+def test_saving_and_loading_changes_nothing(tmp_path):
+    chain = round_the_corner()
+    chain.save(tmp_path / "chain")
+    loaded = SkillChain.load(tmp_path / "chain")
+    assert (loaded.env_id, loaded.env_kwargs, loaded.time_limit) == (chain.env_id, chain.env_kwargs, chain.time_limit)
+    for mine, theirs in zip(chain.skills, loaded.skills, strict=True):
+        np.testing.assert_array_equal(mine.activation.center, theirs.activation.center)
+        assert type(mine.goal) is type(theirs.goal)
+        assert mine.goal.radius == theirs.goal.radius
+    starts = np.random.default_rng(0).uniform(0.3, 0.7, (5, 2))
+    rng = np.random.default_rng
+    np.testing.assert_array_equal(chain.rollouts(MODEL, starts, epsilon=0.3, rng=rng(1)).states,
+                                  loaded.rollouts(MODEL, starts, epsilon=0.3, rng=rng(1)).states)
+
+
+@pytest.mark.parametrize("name", ["chain.json", "chain.npz", "chain.safetensors"])
+@pytest.mark.parametrize("harm", ["missing", "truncated", "empty"])
+def test_a_damaged_chain_is_named(tmp_path, name, harm):
+    round_the_corner().save(tmp_path)
+    path = tmp_path / name
+    whole = path.read_bytes()
+    path.write_bytes({"truncated": whole[:len(whole) // 2], "empty": b""}.get(harm, b""))
+    if harm == "missing":
+        path.unlink()
+    with pytest.raises(DamagedFile, match=name):
+        SkillChain.load(tmp_path)
+
+
+@pytest.mark.parametrize("change", [{"version": 99}, {"format": "something else"}])
+def test_another_format_is_refused(tmp_path, change):
+    round_the_corner().save(tmp_path)
+    words = json.loads((tmp_path / "chain.json").read_text()) | change
+    (tmp_path / "chain.json").write_text(json.dumps(words))
+    with pytest.raises(DamagedFile):
+        SkillChain.load(tmp_path)
+
+
+def test_evaluation_counts_and_bounds():
+    evaluation = evaluate(round_the_corner(), MODEL, episodes=40, epsilon=0.1, seed=3)
+    assert evaluation.episodes == 40
+    assert evaluation.wilson[0] <= evaluation.success_rate <= evaluation.wilson[1]
+    assert evaluation == evaluate(round_the_corner(), MODEL, episodes=40, epsilon=0.1, seed=3)
+    with pytest.raises(InvalidOption, match="episodes"):
+        evaluate(round_the_corner(), MODEL, episodes=0)
+    with pytest.raises(InvalidOption, match="epsilon"):
+        evaluate(round_the_corner(), MODEL, epsilon=1.2)
+    with pytest.raises(Mismatch, match="trained in"):
+        evaluate(round_the_corner(), make("pbcs/Maze-v0", {"size": 3}))

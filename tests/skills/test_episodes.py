@@ -1,0 +1,64 @@
+"""Episodes that run side by side are the episodes that run one after the other."""
+
+import numpy as np
+import pytest
+
+from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.skills.episodes import run_episodes, with_random_actions
+from pbcs_ompl.skills.goals import Ball, Target
+from pbcs_ompl.skills.shaping import GOAL_REWARD
+
+MODEL = make("pbcs/Maze-v0", {"size": 2})
+
+
+def towards(point):
+    return lambda states: np.clip(np.asarray(point) - states, -0.1, 0.1)
+
+
+def starts(count, seed=0):
+    return np.random.default_rng(seed).uniform(0.1, 0.9, (count, 2))
+
+
+def test_a_batch_equals_single_episodes():
+    goal, act = Ball(np.array([0.5, 0.5]), 0.1), towards([0.5, 0.5])
+    together = run_episodes(MODEL, act, goal, starts(20), epsilon=0.0, max_steps=30, rng=np.random.default_rng(0))
+    apart = [run_episodes(MODEL, act, goal, one[None], epsilon=0.0, max_steps=30, rng=np.random.default_rng(0))
+             for one in starts(20)]
+    assert together.steps.tolist() == [episode.steps[0] for episode in apart]
+    assert together.reached.all()
+    assert together.transitions == sum(episode.transitions for episode in apart) == together.steps.sum()
+    rows = {tuple(np.r_[s, a, r, n, t]) for s, a, r, n, t in zip(
+        together.states, together.controls, together.rewards, together.next_states, together.terminals, strict=True)}
+    assert rows == {tuple(np.r_[s, a, r, n, t]) for e in apart for s, a, r, n, t in zip(
+        e.states, e.controls, e.rewards, e.next_states, e.terminals, strict=True)}
+
+
+def test_transitions_are_steps_of_the_environment():
+    episodes = run_episodes(MODEL, towards([1.5, 0.5]), Target(0.2), starts(10), epsilon=0.5, max_steps=15,
+                            rng=np.random.default_rng(1))
+    np.testing.assert_array_equal(MODEL.transition(episodes.states, episodes.controls).states, episodes.next_states)
+
+
+def test_only_the_last_transition_of_a_successful_episode_is_terminal():
+    goal = Ball(np.array([0.5, 0.5]), 0.1)
+    episodes = run_episodes(MODEL, towards([0.5, 0.5]), goal, np.array([[0.2, 0.2], [1.5, 1.5]]), epsilon=0.0,
+                            max_steps=10, rng=np.random.default_rng(0))
+    assert episodes.reached.tolist() == [True, False]
+    assert episodes.terminals.sum() == 1
+    assert episodes.rewards[episodes.terminals].tolist() == [GOAL_REWARD]
+    assert goal.contains(MODEL, episodes.next_states[episodes.terminals]).all()
+    assert episodes.success_rate == 0.5
+
+
+def test_unshaped_rewards_are_the_environments():
+    episodes = run_episodes(MODEL, towards([0.5, 1.5]), Target(0.2), np.array([[0.5, 1.2]]), epsilon=0.0,
+                            max_steps=10, rng=np.random.default_rng(0), shaped=False)
+    assert episodes.rewards.tolist() == [1.0]
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.1, 0.5, 1.0])
+def test_a_share_epsilon_of_the_actions_is_random_and_in_the_box(epsilon):
+    controls = with_random_actions(MODEL, np.full((20_000, 2), 0.05), epsilon, np.random.default_rng(0))
+    changed = (controls != 0.05).any(axis=1)
+    assert abs(changed.mean() - epsilon) < 0.02
+    assert (np.abs(controls) <= 0.1).all()

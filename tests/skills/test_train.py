@@ -1,0 +1,185 @@
+"""Training end to end: it solves, repeats itself, stops anywhere and goes on; its mistakes are named."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from pbcs_ompl.bridge.plan import plan
+from pbcs_ompl.core.errors import (
+    CallbackFailed,
+    DamagedFile,
+    InvalidOption,
+    Mismatch,
+    RunFolderError,
+    TrainingStalled,
+    UnknownName,
+)
+from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.skills import SkillChain, resume, train
+from pbcs_ompl.skills.policy import policy_to_arrays
+
+MAZE = {"size": 2}
+
+
+def fingerprint(result):
+    """Everything that two equal trainings share."""
+    arrays = [array for skill in result.chain.skills for array in policy_to_arrays(skill.policy).values()]
+    summary = {name: value for name, value in result.summary().items() if name not in ("seconds", "out")}
+    return summary, [array.tobytes() for array in arrays]
+
+
+def test_pbcs_solves_the_small_maze(tmp_path):
+    result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, out=tmp_path / "run")
+    assert result.solved
+    assert result.robust.success_rate >= 0.95
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {
+        "config.toml", "result.json", "plan.json", "trajectory.npz", "chain"}
+    chain = SkillChain.load(tmp_path / "run" / "chain")
+    model = make("pbcs/Maze-v0", MAZE)
+    np.testing.assert_array_equal(chain.rollout(model, model.initial_state(0)),
+                                  result.chain.rollout(model, model.initial_state(0)))
+    assert json.loads((tmp_path / "run" / "result.json").read_text())["train_transitions"] == result.train_transitions
+
+
+def test_the_same_seed_gives_the_same_chain_in_a_fresh_process(tmp_path):
+    script = ("import sys; from pbcs_ompl.skills import train; "
+              "train('pbcs/Maze-v0', env_kwargs={'size': 2}, seed=5, out=sys.argv[1])")
+    subprocess.run([sys.executable, "-c", script, str(tmp_path / "other")], check=True)
+    mine = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=5)
+    other = SkillChain.load(tmp_path / "other" / "chain")
+    model = make("pbcs/Maze-v0", MAZE)
+    np.testing.assert_array_equal(mine.chain.rollout(model, model.initial_state(0)),
+                                  other.rollout(model, model.initial_state(0)))
+
+
+class StopAfter:
+    """A Ctrl-C at the n-th report of the training phase."""
+
+    def __init__(self, count):
+        self.left = count
+
+    def __call__(self, numbers):
+        self.left -= numbers["phase"] == "train"
+        if not self.left:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("method", ["pbcs", "pb", "backplay"])
+def test_an_interrupted_training_goes_on_bit_for_bit(tmp_path, method):
+    options = {"env_kwargs": MAZE, "seed": 1, "method": method, "settings": {"verify_episodes": 20}}
+    whole = train("pbcs/Maze-v0", **options)
+    with pytest.raises(KeyboardInterrupt):
+        train("pbcs/Maze-v0", **options, out=tmp_path / "run", on_progress=StopAfter(3))
+    for stop in (1, 7):
+        with pytest.raises(KeyboardInterrupt):
+            resume(tmp_path / "run", on_progress=StopAfter(stop))
+    result = resume(tmp_path / "run")
+    assert fingerprint(result) == fingerprint(whole)
+    assert not (tmp_path / "run" / "checkpoint.npz").exists()
+
+
+def test_a_stop_while_a_link_is_learnt_anew_goes_on_bit_for_bit(tmp_path):
+    """An impossible standard of verification keeps the chain open until the budget ends."""
+    options = {"env_kwargs": MAZE, "seed": 2, "max_transitions": 150_000,
+               "settings": {"verify_episodes": 20, "epsilon": 0.9, "test_epsilon": 0.0}}
+    with pytest.raises(TrainingStalled) as whole:
+        train("pbcs/Maze-v0", **options)
+    with pytest.raises(KeyboardInterrupt):
+        train("pbcs/Maze-v0", **options, out=tmp_path / "run", on_progress=StopAfter(60))
+    with pytest.raises(TrainingStalled) as resumed:
+        resume(tmp_path / "run")
+    first, second = whole.value.result, resumed.value.result
+    assert (first.train_transitions, first.updates) == (second.train_transitions, second.updates)
+
+
+def test_a_budget_ends_a_training_with_what_was_learnt_and_a_larger_one_goes_on(tmp_path):
+    with pytest.raises(TrainingStalled, match="budget of 3000") as stalled:
+        train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, max_transitions=3000, out=tmp_path / "run")
+    assert not stalled.value.result.solved
+    assert stalled.value.result.trajectory is not None
+    assert (tmp_path / "run" / "result.json").is_file()
+    assert resume(tmp_path / "run", max_transitions=10_000_000).solved
+
+
+def test_an_unreachable_goal_stalls(tmp_path):
+    with pytest.raises(TrainingStalled, match="no way to the goal"):
+        train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, max_transitions=50, out=tmp_path / "run")
+
+
+def test_the_plain_agent_does_not_need_a_plan():
+    with pytest.raises(TrainingStalled) as stalled:
+        train("pbcs/Maze-v0", env_kwargs=MAZE, method="plain", max_transitions=6000)
+    assert stalled.value.result.plan_transitions == 0
+    assert stalled.value.result.train_transitions >= 6000
+
+
+def test_the_thesis_preset_trains_with_its_own_networks_and_order():
+    with pytest.raises(TrainingStalled) as stalled:
+        train("pbcs/Maze-v0", env_kwargs=MAZE, preset="thesis", max_transitions=4000, seed=0,
+              agent_settings={"hidden": [32, 32]})
+    result = stalled.value.result
+    assert result.updates > 0
+    assert len(result.milestones) == result.trajectory.length + 1
+
+
+def test_a_plan_made_before_is_used():
+    found = plan("pbcs/Maze-v0", "Ex", env_kwargs=MAZE, seed=3)
+    result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=3, trajectory=found.trajectory)
+    assert result.solved
+    assert result.plan_transitions == 0
+    with pytest.raises(Mismatch):
+        train("pbcs/Maze-v0", env_kwargs={"size": 3}, trajectory=found.trajectory)
+
+
+@pytest.mark.parametrize(("options", "error", "hint"), [
+    ({"agent": "dpg"}, UnknownName, "did you mean 'ddpg'"),
+    ({"method": "pbsc"}, UnknownName, "did you mean 'pbcs'"),
+    ({"preset": "slow"}, UnknownName, "preset"),
+    ({"prest": "fast"}, UnknownName, "did you mean 'preset'"),
+    ({"settings": {"bta": 3}}, InvalidOption, "did you mean 'beta'"),
+    ({"agent_settings": {"discont": 0.5}}, InvalidOption, "did you mean 'discount'"),
+    ({"agent_settings": {"discount": 1.0}}, InvalidOption, "discount"),
+    ({"max_transitions": 0}, InvalidOption, "max_transitions"),
+])
+def test_wrong_options_are_named(options, error, hint):
+    with pytest.raises(error, match=hint):
+        train("pbcs/Maze-v0", env_kwargs=MAZE, **options)
+
+
+def test_folders_are_never_overwritten_and_damage_is_named(tmp_path):
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.txt").write_text("years of work")
+    with pytest.raises(RunFolderError, match="already exists"):
+        train("pbcs/Maze-v0", env_kwargs=MAZE, out=tmp_path / "full")
+    with pytest.raises(RunFolderError, match="nothing to resume"):
+        resume(tmp_path / "absent")
+    with pytest.raises(KeyboardInterrupt):
+        train("pbcs/Maze-v0", env_kwargs=MAZE, seed=1, out=tmp_path / "run", on_progress=StopAfter(3))
+    checkpoint = tmp_path / "run" / "checkpoint.npz"
+    checkpoint.write_bytes(checkpoint.read_bytes()[:1000])
+    with pytest.raises(DamagedFile, match="checkpoint"):
+        resume(tmp_path / "run")
+
+
+def test_an_exception_of_the_environment_is_named():
+    found = plan("pbcs/Maze-v0", "Ex", env_kwargs=MAZE, seed=3)
+    model = make("pbcs/Maze-v0", MAZE)
+
+    def broken(states, controls):
+        raise ZeroDivisionError("physics")
+
+    model.transition = broken
+    with pytest.raises(CallbackFailed, match="physics"):
+        train(model, trajectory=found.trajectory)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kwargs", "seeds"), [({"size": 3}, 20), ({"size": 4}, 20), ({"size": 5}, 20)])
+def test_pbcs_solves_every_small_maze(kwargs, seeds, record_property):
+    maze = [kwargs | ({"maze_seed": seed} if kwargs["size"] > 3 else {}) for seed in range(seeds)]
+    solved = sum(train("pbcs/Maze-v0", env_kwargs=kwargs, seed=seed).solved for seed, kwargs in enumerate(maze))
+    record_property("solve_rate", ["PBCS", kwargs["size"], solved, seeds])
+    assert solved == seeds
