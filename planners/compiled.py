@@ -1,8 +1,8 @@
 """Environments whose step is compiled, and strategies that then run as one compiled loop.
 
-A call of `transition` from Python costs ten microseconds whatever the batch, and Ex loses its depth-first dives when
-many nodes are expanded together. Where both the strategy and the step are compiled, nodes are expanded one at a
-time at full speed, and the tree is that of `batch=1`, bit for bit.
+A call of `transition` from Python costs ten microseconds whatever the batch, and Ex loses its depth-first
+dives when many nodes are expanded together. Where both the strategy and the step are compiled, nodes are
+expanded one at a time at full speed, and the tree is that of `batch=1`, bit for bit.
 """
 
 from typing import Any, NamedTuple, Protocol, runtime_checkable
@@ -29,9 +29,9 @@ class CompiledStep(NamedTuple):
 
     step: Any
     """`step(reals, table, integers, states, parent, controls, child) -> (reward, terminated, success)` advances
-    states[parent] under controls[child] and writes states[child]. Compiled with @njit(signature, cache=True) where the
-    signature is "Tuple((f8, b1, b1))(f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, f8[:, ::1], i8)". Rows are given
-    by index because a view of a row costs as much as the step of a point."""
+    states[parent] under controls[child] and writes states[child]. Compiled with @njit(signature, cache=True)
+    where the signature is "Tuple((f8, b1, b1))(f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, f8[:, ::1],
+    i8)". Rows are given by index because a view of a row costs as much as the step of a point."""
     reals: Array
     table: Array
     """Real parameters in rows."""

@@ -16,14 +16,15 @@ WIDEST = 4
 
 
 class SparseFirst(Strategy):
-    """Draw nodes with probability proportional to 1 / omega(s), omega the number of nodes closer than d to s.
+    """Draw nodes with probability proportional to 1 / omega(s), omega the number of nodes closer than d to s (Fig. 3.5).
 
-    Differs: omega counts the nodes in the 3^F bins of edge d around s's bin instead of a ball of radius d; with more
-    than four features, in s's bin alone. And with batches, the nodes of a batch (one percent of the tree) do not
-    see each other's children.
+    Differs: for the ball of radius d stand the 3^F bins of edge 2 d / 3 around s's bin, a box of edge 2 d;
+        with more than four features, s's bin of edge 2 d alone. And the nodes of a batch (one percent of the
+        tree, 1 with `batch=1`) do not see each other's children. OMPL's EST draws cells by 1 / n and then any
+        of their n nodes: that is 1 / n^2 for a node, more eager than the thesis's rule.
 
     Args:
-        distance: d; by default twice the bin size that the problem suggests, along each feature.
+        distance: d; by default the bin size that the problem suggests, along each feature.
     """
 
     def __init__(self, distance: float | None = None):
@@ -33,8 +34,9 @@ class SparseFirst(Strategy):
         """Begin without bins."""
         super().start(space, rng)
         features = len(space.bin_size)
-        self._size = 2.0 * space.bin_size if self._distance is None else np.full(features, self._distance)
+        distance = np.array(space.bin_size) if self._distance is None else np.full(features, self._distance)
         self._reach = 1 if features <= WIDEST else 0
+        self._size = 2.0 * distance / (2 * self._reach + 1)
         self._bins = empty_queue(features)
 
     def batch(self, tree: Tree) -> int:

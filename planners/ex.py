@@ -17,13 +17,14 @@ from planners.tree_planner import StrategyPlanner
 class LeastExpanded(Strategy):
     """The choice of [Matheron2020] Alg. 5, in O(1) for any size of the tree.
 
-    Differs: none when nodes are expanded one at a time, as they are wherever the environment's step is compiled or
-    `batch=1`. Otherwise as many nodes are selected together as bins are tied for the lowest count: Alg. 5 would select
-    each of these bins before any other too, unless a new bin cuts in. More than that makes Ex forget its dives
-    into new bins, and costs it many times the transitions.
+    Differs: none when nodes are expanded one at a time, as they are wherever the environment's step is
+        compiled or `batch=1`. Otherwise as many nodes are selected together as bins are tied for the lowest
+        count: Alg. 5 would select each of these bins before any other too, unless a new bin cuts in. More
+        than that makes Ex forget its dives into new bins, and costs it many times the transitions.
 
     Args:
-        bin_size: Edge length of the bins, one for all features or one for each; by default what the problem suggests.
+        bin_size: Edge length of the bins, one for all features or one for each; by default what the problem
+            suggests.
     """
 
     def __init__(self, bin_size: float | Sequence[float] | None = None):

@@ -23,7 +23,7 @@ class PositionGrid(oc.GridDecomposition):
         """Write the position of `state` into `coordinates` [2]."""
         coordinates[0], coordinates[1] = state[0], state[1]
 
-    def sampleFullState(self, sampler: Any, coordinates: Any, state: Any) -> None:  # noqa: N802 - OMPL's name
+    def sampleFullState(self, sampler: Any, coordinates: Any, state: Any) -> None:
         """Draw a state at the position `coordinates` [2]."""
         sampler.sampleUniform(state)
         state[0], state[1] = coordinates[0], coordinates[1]

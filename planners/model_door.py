@@ -18,8 +18,8 @@ class ModelDoor(Door):
     """States are vectors, a control is one step, and success is what the environment says it is.
 
     Attributes:
-        compiled: The environment's step for compiled loops, where it offers one and features are dimensions of
-            the state.
+        compiled: The environment's step for compiled loops, where it offers one and features are dimensions
+            of the state.
         feature_dims: These dimensions.
 
     Raises:

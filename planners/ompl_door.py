@@ -17,8 +17,9 @@ class OmplDoor(Door):
     """States are OMPL's, of any space; the feature is the default projection, as for OMPL's KPIECE1 and EST.
 
     A control is held for a random number of steps within the problem's bounds and cut short where the motion
-    becomes invalid; the end is kept if it was held for the least number of steps, as OMPL's own planners do. In the
-    tree, the states are the projections. Rewards are 0, no state is terminal, and the goal is the problem's.
+    becomes invalid; the end is kept if it was held for the least number of steps, as OMPL's own planners do.
+    In the tree, the states are the projections. Rewards are 0, no state is terminal, and the goal is the
+    problem's.
 
     Raises:
         UnsupportedSpace: no default projection, or controls that are not real vectors.

@@ -1,7 +1,7 @@
 """OMPL's own control planners as registry entries, and what the installed OMPL cannot build of them.
 
-OMPL draws from one random stream for the whole process: `build` seeds it, and equal seeds give equal paths when
-the problem was built after the seeding too, as `pbcs_ompl.bridge` does.
+OMPL draws from one random stream for the whole process: `build` seeds it, and equal seeds give equal paths
+when the problem was built after the seeding too, as `pbcs_ompl.bridge` does.
 """
 
 from collections.abc import Callable, Iterator
@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
-from ompl import base as ob
 from ompl import control as oc
 from ompl import util as ou
 
@@ -26,7 +25,8 @@ class StockPlanner:
     Attributes:
         name: The class in `ompl.control`.
         options: The setter and the default of each option; None leaves OMPL's own.
-        decomposition: Makes the second argument of the constructor from the space information, if there is one.
+        decomposition: Makes the second argument of the constructor from the space information, if there is
+            one.
     """
 
     name: str

@@ -22,7 +22,8 @@ class Space:
         bin_size: Suggested edge length of bins [F].
         action_low, action_high: Bounds of the controls [A].
         episode_steps: Suggested length of an episode.
-        steer: Returns controls [B, A] that lead from states [B, D] towards features [B, F]; None if nobody can.
+        steer: Returns controls [B, A] that lead from states [B, D] towards features [B, F]; None if nobody
+            can.
     """
 
     feature_low: Array

@@ -6,7 +6,7 @@ import numpy as np
 from ompl import base as ob
 
 from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere
-from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, PbcsError
+from pbcs_ompl.core.errors import CallbackFailed, PbcsError
 from pbcs_ompl.core.seeding import SeedTree
 from planners.compiled import CompiledStep, CompiledStrategy
 from planners.door import Door
@@ -24,13 +24,13 @@ CHUNK = 2048
 class TreePlanner(ob.Planner):
     """Selects nodes, propagates them, keeps what follows, until a node is in the goal.
 
-    It works on any `ompl.control.SpaceInformation`. After `use_model` it propagates through the environment itself,
-    many nodes at a time. Only exact solutions are reported. Exceptions never cross OMPL: `solve` keeps the first in
-    `error` and answers ABORT. A second `solve` goes on with the same tree; `clear` drops it and goes on with the
-    same random numbers.
+    It works on any `ompl.control.SpaceInformation`. After `use_model` it propagates through the environment
+    itself, many nodes at a time. Only exact solutions are reported. Exceptions never cross OMPL: `solve`
+    keeps the first in `error` and answers ABORT. A second `solve` goes on with the same tree; `clear` drops
+    it and goes on with the same random numbers.
 
-    `getPlannerData` tells OMPL of no nodes, because the installed OMPL aborts when Python overrides it; use `tree`
-    or `planner_data`.
+    `getPlannerData` tells OMPL of no nodes, because the installed OMPL aborts when Python overrides it; use
+    `tree` or `planner_data`.
 
     Args:
         si: The `ompl.control.SpaceInformation`.
@@ -38,9 +38,6 @@ class TreePlanner(ob.Planner):
         strategy: Which nodes to expand. It belongs to this planner.
         seed: Equal seeds give equal trees.
         batch: How many nodes are selected before any of them is expanded; "grow" leaves it to the strategy.
-
-    Attributes:
-        error: What ended the last `solve` abnormally: always a PbcsError, with its cause chained; else None.
 
     Raises:
         InvalidOption: `batch` is neither "grow" nor a positive integer.
@@ -54,7 +51,21 @@ class TreePlanner(ob.Planner):
         self._rng = self._seeds.child("strategy").generator()
         self._door: Door | None = None
         self._tree: Tree | None = None
-        self.error: PbcsError | None = None
+        self._error: PbcsError | None = None
+
+    @property
+    def error(self) -> PbcsError | None:
+        """What ended the last `solve` abnormally, with its cause chained; else None.
+
+        Always a new exception: one that is raised holds the frames that it went through, and so the planner.
+        If the planner held it too, OMPL would never be rid of either.
+        """
+        if self._error is None:
+            return None
+        kind = type(self._error)
+        error = kind.__new__(kind, *self._error.args)
+        error.__cause__ = self._error.__cause__
+        return error
 
     @property
     def tree(self) -> Tree | None:
@@ -80,17 +91,17 @@ class TreePlanner(ob.Planner):
         """Forget the tree."""
         super().clear()
         self._tree = None
-        self.error = None
+        self._error = None
 
     def solve(self, ptc: Any) -> Any:
         """Grow the tree until the goal, the end of the budget, or `ptc`: a condition, a callable or seconds."""
-        self.error = None
+        self._error = None
         try:
             return ob.PlannerStatus(self._solve(_condition(ptc)))
         except PbcsError as error:
-            self.error = _without_own_frames(error)
+            self._error = error.with_traceback(None)
         except Exception as error:
-            self.error = _failure(self.getName(), _without_own_frames(error))
+            self._error = _failure(self.getName(), _without_own_frames(error))
         return ob.PlannerStatus(ob.PlannerStatus.ABORT)
 
     def planner_data(self) -> Any:
@@ -98,8 +109,9 @@ class TreePlanner(ob.Planner):
         data = ob.PlannerData(self.getSpaceInformation())
         if self._door is None or self._tree is None:
             return data
-        for node, parent in enumerate(self._tree.parents.tolist()):
-            vertex = ob.PlannerDataVertex(self._door.state(self._tree, node))
+        states = [self._door.state(self._tree, node) for node in range(len(self._tree))]  # vertices only point to them
+        for state, parent in zip(states, self._tree.parents.tolist(), strict=True):
+            vertex = ob.PlannerDataVertex(state)
             index = data.addStartVertex(vertex) if parent < 0 else data.addVertex(vertex)
             if parent >= 0:
                 data.addEdge(parent, index)
@@ -125,16 +137,21 @@ class TreePlanner(ob.Planner):
 
     def _plant(self, door: Door, goal: Any) -> int:
         """Begin the tree with the start states; return one that is in the goal, or -1."""
-        tree, reached = door.new_tree(), -1
+        tree = door.new_tree()
+        reached = self._add_roots(door, tree, goal)
+        if len(tree) > 0:
+            self._strategy.start(door.space(), self._rng)
+            self._strategy.inserted(tree, 0, len(tree))
+            self._tree = tree
+        return reached
+
+    def _add_roots(self, door: Door, tree: Tree, goal: Any) -> int:
+        reached = -1
         inputs = self.getPlannerInputStates()
         inputs.restart()
         while (state := inputs.nextStart()) is not None:
             if door.add_root(tree, state, goal):
                 reached = len(tree) - 1
-        if len(tree) > 0:
-            self._strategy.start(door.space(), self._rng)
-            self._strategy.inserted(tree, 0, len(tree))
-            self._tree = tree
         return reached
 
     def _advance(self, door: Door, tree: Tree, goal: Any) -> int:

@@ -1,9 +1,9 @@
 """Networks of `networks.py` as kernels, for one seed of a stack on a CPU (without layer norm).
 
-A pass works in one flat array, the tape: the inputs [B, sizes[0]], the values of the first layer [B, sizes[1]],
-and so on to the outputs, one block after the other. Slopes (derivatives of the loss by these values) lie in an
-array of the same shape. `flat` is the buffer of a whole stack, of which `seed` takes its share of each block; a
-gradient is a buffer of one seed.
+A pass works in one flat array, the tape: the inputs [B, sizes[0]], the values of the first layer
+[B, sizes[1]], and so on to the outputs, one block after the other. Slopes (derivatives of the loss by these
+values) lie in an array of the same shape. `flat` is the buffer of a whole stack, of which `seed` takes its
+share of each block; a gradient is a buffer of one seed.
 """
 
 import numpy as np

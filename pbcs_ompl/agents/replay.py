@@ -30,8 +30,8 @@ class Batch(NamedTuple):
 class Replay:
     """Rings of transitions, sampled uniformly with replacement.
 
-    Memory grows as it is filled. The draws of a seed are a function of its number and of how many went before:
-    a stack of S seeds draws what S separate buffers draw, however many are made at once.
+    Memory grows as it is filled. A seed's draws are a function of its number and of how many went before,
+    so a stack of S seeds draws what S separate buffers draw, however many are made at once.
 
     Args:
         seeds: One number for each ring.

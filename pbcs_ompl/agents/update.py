@@ -33,9 +33,9 @@ def choose_device(name: str | torch.device) -> torch.device:
 def compiled(function: Callable[..., Any], compile: Compile, device: torch.device) -> Callable[..., Any]:
     """Return `function`, compiled by torch when asked for; "auto" does so on CUDA only.
 
-    On a CPU the hand-written gradients leave torch's compiler 5 to 20 %, for which it would take 5 to 40 s; there
-    an algorithm may bring a kernel, which is faster than both. When compilation fails, the same function goes on
-    uncompiled, with one warning.
+    On a CPU the hand-written gradients leave torch's compiler 5 to 20 %, for which it would take 5 to 40 s;
+    there an algorithm may bring a kernel, which is faster than both. When compilation fails, the function
+    goes on as it is, with one warning.
 
     Raises:
         InvalidOption: `compile` is none of True, False, "auto".

@@ -5,6 +5,7 @@ Exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 somethin
 """
 
 import sys
+import traceback
 from collections.abc import Sequence
 from importlib import import_module
 
@@ -21,11 +22,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         arguments = parse(build_parser(), words)
         return int(import_module(f"pbcs_ompl.cli.{arguments.verb}").run(arguments))
     except PbcsError as error:
-        return _complain(f"error: {error}", error.exit_code)
-    except KeyboardInterrupt as interrupt:
-        return _complain(f"interrupted; {interrupt or 'run the same command again to start over'}", 130)
+        return _complain(error, f"error: {error}", error.exit_code)
+    except KeyboardInterrupt as error:
+        remedy = str(error) or "run the same command again to start over"
+        return _complain(error, f"interrupted; {remedy}", 130)
 
 
-def _complain(message: str, status: int) -> int:
+def _complain(error: BaseException, message: str, status: int) -> int:
+    """Print one line, and let go of what the failed call held: OMPL's bindings list it as leaked at exit."""
     print("pbcs:", " ".join(message.split()), file=sys.stderr)
+    link: BaseException | None = error
+    while link is not None:
+        traceback.clear_frames(link.__traceback__)
+        link.__traceback__ = None
+        link = link.__cause__ or link.__context__
     return status

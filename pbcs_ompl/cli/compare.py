@@ -1,10 +1,11 @@
 """`pbcs compare`: planners x seeds on one environment, as a table, a picture and a Planner Arena database."""
 
+import json
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from pbcs_ompl.cli.folders import environment_words, fresh_folder
+from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_comparison
 from pbcs_ompl.cli.terminal import Report, conclude, duration, list_files, short
 from pbcs_ompl.compare.compare import compare
@@ -21,7 +22,8 @@ def run(arguments: Namespace) -> int:
                                  jobs=arguments.jobs, out=out, on_progress=report)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"go on with the same command and --out {out}") from None
-    draw_comparison(comparison, f"{environment_words(arguments)}, {arguments.seeds} seeds", out)
+    options = f" {json.dumps(arguments.env_kwargs)}" if arguments.env_kwargs else ""
+    draw_comparison(comparison, f"{arguments.env}{options}, {arguments.seeds} seeds", out)
     summary = comparison.summary()
     conclude(summary, _closing_lines(summary, out), as_json=arguments.json)
     return 0 if any(row["solved"] for row in summary["rows"]) else 1

@@ -17,12 +17,12 @@ def compare_figure(transitions: Mapping[str, Sequence[float | None]], *, title: 
     """
     figure, axes = new_figure(7.2, 4.6)
     solved = {name: np.sort([float(n) for n in runs if n is not None]) for name, runs in transitions.items()}
-    most = max((float(found[-1]) for found in solved.values() if len(found)), default=1.0)
+    everything = np.concatenate([np.empty(0), *solved.values()])
+    least, most = (everything.min(), everything.max()) if len(everything) else (1.0, 10.0)
     for name, found in solved.items():
         runs = len(transitions[name])
-        shares = np.arange(len(found) + 1) / runs
-        x = np.concatenate([found[:1], found, [most]]) if len(found) else np.array([most])
-        y = np.concatenate([[0.0], shares[1:], shares[-1:]]) if len(found) else np.array([0.0])
+        x = np.concatenate([found[:1], found, [most]]) if len(found) else np.array([least, most])
+        y = np.array([0, *range(1, len(found) + 1), len(found)]) / runs if len(found) else np.zeros(2)
         axes.step(x, y, where="post", linewidth=2, marker="." if runs <= 50 else None,
                   label=f"{name} ({len(found)}/{runs} solved)")
     axes.set_xscale("log")

@@ -1,8 +1,9 @@
 """The memory of Ex: bins, their nodes, and how often each was expanded, with O(1) insertion and selection.
 
-Differs from [Matheron2020] Alg. 5: the hash tables W_b, B_s, B_m of lists become sorted slices of two arrays (see
-`runs`), one for the bins and one pool for the nodes of all bins. A bin's slice has room for a power of two of rows;
-when it is full it moves to a slice of twice the size, and its old slice waits in a free list for another bin.
+Differs from [Matheron2020] Alg. 5: the hash tables W_b, B_s, B_m of lists become sorted slices of two arrays
+(see `runs`), one for the bins and one pool for the nodes of all bins. A bin's slice has room for a power of
+two of rows; when it is full it moves to a slice of twice the size, and its old slice waits in a free list for
+another bin.
 """
 
 from typing import NamedTuple

@@ -30,8 +30,8 @@ def expand(step, reals, table, integers, feature_dims, low, high, columns, first
     """Expand a node for each row of `uniforms` [B, 2 + A] (bin, node, control); write the new nodes from `first` on.
 
     Returns:
-        How many nodes were written, and why the loop ended. Unless DONE, the last of them is not in the queue:
-        it is the goal, or the queue was too small for it, or its state is not finite.
+        How many nodes were written, and why the loop ended. Unless DONE, the last of them is not in the
+        queue: it is the goal, or the queue was too small for it, or its state is not finite.
     """
     done = 0
     cell = np.empty(len(bin_size), np.int64)

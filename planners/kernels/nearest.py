@@ -1,10 +1,10 @@
 """Exact nearest neighbours among points that are only ever added.
 
-The first n points are cut into segments whose sizes are the powers of two in the binary form of n, large ones first
-(Bentley and Saxe 1980). Each segment of at least LEAF points is a k-d tree: an implicit one, the point in the middle
-of a range is the median of the range along an axis that turns with the depth. A new point rebuilds the
-segment that it completes, so that a point is rebuilt O(log n) times, and no order of insertion degenerates the trees, as
-it does a k-d tree that grows at its leaves ([Matheron2020] A.3).
+The first n points are cut into segments whose sizes are the powers of two in the binary form of n, large ones
+first (Bentley and Saxe 1980). Each segment of at least LEAF points is a k-d tree: an implicit one, the point
+in the middle of a range is the median of the range along an axis that turns with the depth. A new point
+rebuilds the segment that it completes, so that a point is rebuilt O(log n) times, and no order of insertion
+degenerates the trees, as it does a k-d tree that grows at its leaves ([Matheron2020] A.3).
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
 """A least-count queue in one array: members sorted by decreasing count, raised in O(1).
 
-A queue is a slice `entries[start : start + length]` of rows (member, count, run start), int32. Equal counts form a run.
-A run's first position, relative to `start`, is written at the run's *last* row; the other rows hold leftovers. The
-lowest run is the tail of the slice, so that a random member of it is one random number away, and raising a member is
-one swap with the first of its run, which then is the end of the run before.
+A queue is a slice `entries[start : start + length]` of rows (member, count, run start), int32. Equal counts
+form a run. A run's first position, relative to `start`, is written at the run's *last* row; the other rows
+hold leftovers. The lowest run is the tail of the slice, so that a random member of it is one random number
+away, and raising a member is one swap with the first of its run, which then is the end of the run before.
 """
 
 import numpy as np
@@ -30,8 +30,8 @@ def append(entries: Entries, start: int, length: int, member: int) -> None:
 def choose(entries: Entries, start: int, length: int, uniform: float) -> int:
     """Return a random member of the lowest run, by a number uniform in [0, 1), and raise its count by one.
 
-    Equals "remove it from the list of its count, append it to the list of the next" of [Matheron2020] Alg. 5, where
-    removal puts the list's first element into the gap.
+    Equals "remove it from the list of its count, append it to the list of the next" of [Matheron2020] Alg. 5,
+    where removal puts the list's first element into the gap.
     """
     last = length - 1
     first = entries[start + last, RUN]

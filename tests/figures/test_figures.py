@@ -104,7 +104,7 @@ def test_comparison_ends_at_the_solved_share(tmp_path):
     figure = compare_figure({"Ex": [10, 20, None, 40], "EST": [None, None]}, title="two planners")
     ex, est = figure.axes[0].lines
     assert ex.get_ydata()[-1] == 0.75
-    assert list(est.get_ydata()) == [0]
+    assert list(est.get_ydata()) == [0, 0]
     assert save(figure, tmp_path / "compare.png").exists()
 
 

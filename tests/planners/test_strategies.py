@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.core.errors import InvalidOption
-from planners import ESTAdapted, RandomWalk, RRTNH, RRTSteered, Space, Tree
+from planners import RRTNH, ESTAdapted, RandomWalk, RRTSteered, Space, Tree
 from planners.est_adapted import SparseFirst
 from planners.rrt_nh import NearestToRandom
 
@@ -21,14 +21,14 @@ def tree_of(points, terminal=False):
 
 @pytest.mark.parametrize("features", [1, 2, 3, 5])
 def test_est_draws_nodes_by_the_inverse_of_omega(features):
-    """The frequency of each node is proportional to 1 / (nodes in the 3^F cells around), beyond 4 features to 1 / own."""
+    """A node's frequency goes with 1 / (nodes in the 3^F cells around it); beyond 4 features, in its cell alone."""
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(2.0, 0.2, (40, features)), rng.uniform(0, 4, (20, features))])
     strategy = SparseFirst()
     strategy.start(space(features), rng)
     strategy.inserted(tree_of(points), 0, 60)
-    cells = np.floor(points)
     reach = 1 if features <= 4 else 0
+    cells = np.floor(points / (1.0 / (2 * reach + 1)))
     omega = (np.abs(cells[:, None] - cells[None]).max(axis=2) <= reach).sum(axis=1)
     expected = (1.0 / omega) / (1.0 / omega).sum()
     hits = np.bincount(strategy.select(tree_of(points), 200_000), minlength=60) / 200_000

@@ -43,7 +43,7 @@ def check_tree(model, tree):
 @pytest.mark.parametrize("terminal", [True, False])
 @pytest.mark.parametrize("kind", OURS, ids=lambda kind: kind.__name__)
 def test_tree_path_and_count_belong_together(solve, square, kind, terminal):
-    model = square(terminal=terminal)
+    model = square(extent=1.5, goal=1.2, terminal=terminal)
     planner, status, counter, setup = solve(lambda si: kind(si, seed=2), model, 60_000)
     assert planner.error is None
     check_tree(model, planner.tree)

@@ -1,0 +1,84 @@
+"""What every registered planner promises, ours and OMPL's, on the thesis's 2x2 maze."""
+
+import numpy as np
+import pytest
+from ompl import base as ob
+
+from pbcs_ompl.bridge.problem import make_problem
+from pbcs_ompl.core import registry
+from pbcs_ompl.core.contracts import BatchPlanner, Counter, PlannerFactory
+from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable
+from pbcs_ompl.reset_anywhere import make
+
+BUDGET = 60_000
+
+
+@pytest.fixture(scope="module", params=registry.names("planner"))
+def entry(request):
+    """A registered planner that the installed OMPL can build, and whether it can be expected to find the goal."""
+    entry = registry.load("planner", request.param)
+    try:
+        search(entry, seed=1, budget=1)
+    except PlannerUnavailable as error:
+        pytest.skip(str(error))
+    return entry
+
+
+def search(entry, seed, budget, **options):
+    """Return the outcome of one search as plain values, and what was found wrong with the path."""
+    model, counter = make("pbcs/Maze-v0", {"size": 2}), Counter(budget)
+    with make_problem(model, seed=seed, counter=counter) as problem:
+        setup = problem.setup
+        planner = entry.build(problem.space_information, seed=seed, **options)
+        if isinstance(planner, BatchPlanner):
+            planner.use_model(model, counter)
+        setup.setPlanner(planner)
+        setup.setup()
+        status = planner.solve(ob.PlannerTerminationCondition(lambda: counter.left == 0 or problem.watch.stopped))
+        problem.watch.raise_error()
+        count, states, controls, checked = counter.count, np.empty((0, 2)), np.empty((0, 2)), True
+        if setup.haveExactSolutionPath():
+            path = setup.getSolutionPath()
+            states = np.array([[s[0], s[1]] for s in path.getStates()])
+            controls = np.array([[c[0], c[1]] for c in path.getControls()]).reshape(-1, 2)
+            counter.budget = None
+            checked = path.check()
+        return status.getStatus(), count, states, controls, checked
+
+
+def test_it_is_a_factory(entry):
+    assert isinstance(entry, PlannerFactory)
+
+
+def test_it_solves_the_2x2_maze_and_its_path_replays(entry):
+    solved = 0
+    for seed in range(1, 4):
+        status, count, states, controls, checked = search(entry, seed, BUDGET)
+        assert count <= BUDGET
+        if status != ob.PlannerStatus.EXACT_SOLUTION:
+            continue
+        solved += 1
+        model = make("pbcs/Maze-v0", {"size": 2})
+        assert np.array_equal(states[0], model.initial_state())
+        assert np.array_equal(model.transition(states[:-1], controls).states, states[1:])
+        assert model.transition(states[-2:-1], controls[-1:]).success[0]
+        assert checked
+    assert solved >= (0 if getattr(entry, "__name__", "") == "RandomWalk" else 3)
+
+
+def test_the_budget_is_kept(entry):
+    for budget in (1, 50):
+        _, count, _, _, _ = search(entry, 1, budget)
+        assert count <= budget
+
+
+def test_equal_seeds_give_equal_results(entry):
+    first, again = (search(entry, 2, 5000) for _ in range(2))
+    assert first[:2] == again[:2]
+    assert np.array_equal(first[2], again[2])
+    assert np.array_equal(first[3], again[3])
+
+
+def test_misspelt_options_are_refused(entry):
+    with pytest.raises(InvalidOption):
+        search(entry, 1, 10, no_such_option=1)
