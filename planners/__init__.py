@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from planners.tree import Tree
     from planners.tree_planner import TreePlanner
 
-__all__ = ["RRTNH", "ESTAdapted", "Ex", "RRTSteered", "RandomWalk", "Space", "Strategy", "Tree", "TreePlanner"]
+__all__ = ["RRTNH", "ESTAdapted", "Ex", "RRTSteered", "RandomWalk", "Space", "Strategy", "Tree",
+           "TreePlanner"]
 
 _HOMES = {"ESTAdapted": "est_adapted", "Ex": "ex", "RandomWalk": "random_walk", "RRTNH": "rrt_nh",
           "RRTSteered": "rrt_steered", "Space": "strategy", "Strategy": "strategy", "Tree": "tree",

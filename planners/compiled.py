@@ -28,10 +28,10 @@ class CompiledStep(NamedTuple):
     """A step in the form of a function for Numba, and its parameters; equals `transition` bit for bit."""
 
     step: Any
-    """`step(reals, table, integers, states, parent, controls, child) -> (reward, terminated, success)` advances
-    states[parent] under controls[child] and writes states[child]. Compiled with @njit(signature, cache=True)
-    where the signature is "Tuple((f8, b1, b1))(f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, f8[:, ::1],
-    i8)". Rows are given by index because a view of a row costs as much as the step of a point."""
+    """`step(reals, table, integers, states, parent, controls, child) -> (reward, terminated, success)`
+    advances states[parent] under controls[child] and writes states[child]. It is compiled with
+    @njit("Tuple((f8, b1, b1))(f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, f8[:, ::1], i8)", cache=True).
+    Rows are given by index because a view of a row costs as much as the step of a point."""
     reals: Array
     table: Array
     """Real parameters in rows."""
@@ -71,7 +71,7 @@ def step_of(model: Any) -> CompiledStep | None:
         return None
     step, reals, table, integers = offered
     if not isinstance(step, Dispatcher) or STEP_SIGNATURE.args not in step.signatures:
-        raise CallbackFailed(f"compiled_step of {model.env_id} returned {step!r}; expected a function compiled by "
-                             f"@njit(signature), where the signature is {STEP_SIGNATURE}")
+        raise CallbackFailed(f"compiled_step of {model.env_id} returned {step!r}; expected a function "
+                             f"compiled by @njit(signature), where the signature is {STEP_SIGNATURE}")
     return CompiledStep(step, np.array(reals, np.float64), np.array(table, np.float64, order="C"),
                         np.array(integers, np.int64))

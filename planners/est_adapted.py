@@ -16,12 +16,12 @@ WIDEST = 4
 
 
 class SparseFirst(Strategy):
-    """Draw nodes with probability proportional to 1 / omega(s), omega the number of nodes closer than d to s (Fig. 3.5).
+    """Draw nodes with probability proportional to 1 / omega(s), omega the number of nodes within d of s.
 
     Differs: for the ball of radius d stand the 3^F bins of edge 2 d / 3 around s's bin, a box of edge 2 d;
-        with more than four features, s's bin of edge 2 d alone. And the nodes of a batch (one percent of the
-        tree, 1 with `batch=1`) do not see each other's children. OMPL's EST draws cells by 1 / n and then any
-        of their n nodes: that is 1 / n^2 for a node, more eager than the thesis's rule.
+    with more than four features, s's bin of edge 2 d alone. And the nodes of a batch (one percent of the
+    tree, 1 with `batch=1`) do not see each other's children. OMPL's EST draws cells by 1 / n and then any
+    of their n nodes: that is 1 / n^2 for a node, more eager than the thesis's rule.
 
     Args:
         distance: d; by default the bin size that the problem suggests, along each feature.
@@ -51,7 +51,8 @@ class SparseFirst(Strategy):
 
     def inserted(self, tree: Tree, first: int, last: int) -> None:
         """Put the new nodes that are not terminal into their bins."""
-        self._bins = insert(self._bins, tree.features[first:last], tree.terminal[first:last], self._size, first)
+        new = slice(first, last)
+        self._bins = insert(self._bins, tree.features[new], tree.terminal[new], self._size, first)
 
 
 class ESTAdapted(StrategyPlanner):

@@ -18,9 +18,9 @@ class LeastExpanded(Strategy):
     """The choice of [Matheron2020] Alg. 5, in O(1) for any size of the tree.
 
     Differs: none when nodes are expanded one at a time, as they are wherever the environment's step is
-        compiled or `batch=1`. Otherwise as many nodes are selected together as bins are tied for the lowest
-        count: Alg. 5 would select each of these bins before any other too, unless a new bin cuts in. More
-        than that makes Ex forget its dives into new bins, and costs it many times the transitions.
+    compiled or `batch=1`. Otherwise as many nodes are selected together as bins are tied for the lowest
+    count: Alg. 5 would select each of these bins before any other too, unless a new bin cuts in. More
+    than that makes Ex forget its dives into new bins, and costs it many times the transitions.
 
     Args:
         bin_size: Edge length of the bins, one for all features or one for each; by default what the problem
@@ -38,7 +38,7 @@ class LeastExpanded(Strategy):
         features = len(space.bin_size)
         size = space.bin_size if self._wanted_size is None else self._wanted_size
         if len(size) not in (1, features):
-            raise InvalidOption(f"bin_size has {len(size)} numbers; expected 1 or {features}, one for each feature")
+            raise InvalidOption(f"bin_size has {len(size)} numbers; expected 1, or {features}")
         self._size = np.array(np.broadcast_to(size, features))
         self.queue = empty_queue(features)
 
@@ -59,10 +59,11 @@ class LeastExpanded(Strategy):
 
     def inserted(self, tree: Tree, first: int, last: int) -> None:
         """Put the new nodes into their bins; terminal ones stay out, so they are never selected."""
-        self.queue = insert(self.queue, tree.features[first:last], tree.terminal[first:last], self._size, first)
+        new = slice(first, last)
+        self.queue = insert(self.queue, tree.features[new], tree.terminal[new], self._size, first)
 
     def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:
-        """Expand up to `count` nodes one at a time in compiled code (see planners.compiled.CompiledStrategy)."""
+        """Expand up to `count` nodes one at a time in compiled code (see `planners.compiled`)."""
         low, high = np.array(self.space.action_low), np.array(self.space.action_high)
         uniforms = self.rng.random((count, 2 + len(low)))
         tree.reserve(count)

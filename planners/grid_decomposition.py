@@ -38,8 +38,8 @@ def grid_over(si: Any) -> Any:
     """
     space = si.getStateSpace()
     if not isinstance(space, ob.RealVectorStateSpace) or space.getDimension() < 2:
-        raise UnsupportedSpace(f"a {type(space).__name__}: Syclop's grid expects a real-vector space of two dimensions or "
-                               "more")
+        raise UnsupportedSpace(f"a {type(space).__name__}: Syclop's grid expects a real-vector space of two "
+                               "dimensions or more")
     whole = space.getBounds()
     bounds = ob.RealVectorBounds(2)
     for axis in (0, 1):
@@ -47,10 +47,12 @@ def grid_over(si: Any) -> Any:
         bounds.setHigh(axis, whole.high[axis])
     grid = PositionGrid(bounds)
     state, regions = si.allocState(), set()
-    for x, y in zip(*(np.linspace(whole.low[axis], whole.high[axis], PROBES + 2)[1:-1] for axis in (0, 1)), strict=True):
-        state[0], state[1] = float(x), float(y)
+    low, high = np.array(whole.low[:2]), np.array(whole.high[:2])
+    for part in range(PROBES):
+        state[0], state[1] = (low + (high - low) * (part + 0.5) / PROBES).tolist()
         regions.add(grid.locateRegion(state))
     if len(regions) < PROBES:
-        raise PlannerUnavailable(f"the installed OMPL {version('ompl')} cannot run Syclop planners from Python: it does not "
-                                 "hear where a decomposition projects a state; use Ex, RRT, EST or KPIECE1")
+        raise PlannerUnavailable(f"the installed OMPL {version('ompl')} cannot run Syclop planners from "
+                                 "Python: it does not hear where a decomposition projects a state; use Ex, "
+                                 "RRT, EST or KPIECE1")
     return grid

@@ -44,8 +44,8 @@ class ModelDoor(Door):
     def space(self) -> Space:
         """Describe the environment for a strategy."""
         model = self._model
-        return Space(model.feature_low, model.feature_high, model.bin_size, model.action_low, model.action_high,
-                     model.max_episode_steps, model.advance_towards)
+        return Space(model.feature_low, model.feature_high, model.bin_size, model.action_low,
+                     model.action_high, model.max_episode_steps, model.advance_towards)
 
     def new_tree(self) -> Tree:
         """Return an empty tree of states [D] and features [F]."""
@@ -108,16 +108,17 @@ def check_finite(before: Array, controls: Array, after: Array) -> None:
     if np.isfinite(after).all():
         return
     bad = int(np.argmin(np.isfinite(after).all(axis=1)))
-    raise CallbackFailed(f"the environment returned the state {after[bad].tolist()} from state {before[bad].tolist()} "
-                         f"with control {controls[bad].tolist()}; expected finite numbers")
+    raise CallbackFailed(f"the environment returned the state {after[bad].tolist()} from state "
+                         f"{before[bad].tolist()} with control {controls[bad].tolist()}; "
+                         "expected finite numbers")
 
 
 def _check_shapes(result: Transition, shape: tuple[int, ...]) -> None:
-    for name, got, expected in (("states", result.states.shape, shape), ("rewards", result.rewards.shape, shape[:1]),
-                                ("terminated", result.terminated.shape, shape[:1]),
-                                ("success", result.success.shape, shape[:1])):
-        if got != expected:
-            raise CallbackFailed(f"the environment's transition returned {name} of shape {got}; expected {expected}")
+    for name, array in result._asdict().items():
+        expected = shape if name == "states" else shape[:1]
+        if array.shape != expected:
+            raise CallbackFailed(f"the environment's transition returned {name} of shape {array.shape}; "
+                                 f"expected {expected}")
 
 
 def _check_size(what: str, parts: list[Any], expected: int) -> None:

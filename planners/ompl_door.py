@@ -32,8 +32,8 @@ class OmplDoor(Door):
             si.setup()
         space = si.getStateSpace()
         if not space.hasDefaultProjection():
-            raise UnsupportedSpace(f"the state space {space.getName()!r} has no default projection; register one with "
-                                   "registerDefaultProjection")
+            raise UnsupportedSpace(f"the state space {space.getName()!r} has no default projection; "
+                                   "register one with registerDefaultProjection")
         self.counter = Counter()
         self._si = si
         self._rng = rng
@@ -54,7 +54,8 @@ class OmplDoor(Door):
             box = self._projection.getBounds()
             low, high = np.array(box.low), np.array(box.high)
         action_low, action_high = bounds(self._controls)
-        return Space(low, high, np.array(self._projection.getCellSizes()), np.array(action_low), np.array(action_high))
+        cells = np.array(self._projection.getCellSizes())
+        return Space(low, high, cells, np.array(action_low), np.array(action_high))
 
     def new_tree(self) -> Tree:
         """Return an empty tree of projections."""
@@ -80,9 +81,9 @@ class OmplDoor(Door):
             if held < max(1, least):
                 continue
             if self._si.distance(state, state) != 0.0:  # NaN in any component is a distance that is not 0
-                raise CallbackFailed(f"the propagator returned a state that is not finite, from the node {node} with "
-                                     f"projection {tree.states[node].tolist()} under control {control.tolist()} held for "
-                                     f"{held} steps")
+                raise CallbackFailed("the propagator returned a state that is not finite, from the state "
+                                     f"with projection {tree.states[node].tolist()} under control "
+                                     f"{control.tolist()} held for {held} steps")
             self._add(tree, state, node, held, control)
             if goal.isSatisfied(state):
                 return len(tree) - 1
@@ -105,7 +106,7 @@ class OmplDoor(Door):
     def _add(self, tree: Tree, state: Any, parent: int, steps: int, control: Array | float) -> None:
         self._projection.project(state, self._point)
         if not np.isfinite(self._point).all():
-            raise CallbackFailed(f"the projection of a state is {self._point.tolist()}; expected finite numbers")
+            raise CallbackFailed(f"the projection of a state is {self._point.tolist()}, which is not finite")
         tree.append(self._point[None], parent, control, 0.0, False)
         self._states.append(state)
         self._steps.append(steps)

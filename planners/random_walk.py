@@ -34,9 +34,10 @@ class Walkers(Strategy):
 
     def select(self, tree: Tree, count: int) -> IndexArray:
         """Return where the walkers are; a larger batch brings in more of them."""
-        missing = max(0, count - len(self._at))
-        self._at = np.append(self._at, np.zeros(missing, np.int64))
-        self._steps = np.append(self._steps, np.zeros(missing, np.int64))
+        missing = count - len(self._at)
+        if missing > 0:
+            self._at = np.append(self._at, np.zeros(missing, np.int64))
+            self._steps = np.append(self._steps, np.zeros(missing, np.int64))
         return self._at[:count].copy()
 
     def inserted(self, tree: Tree, first: int, last: int) -> None:

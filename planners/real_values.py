@@ -31,7 +31,7 @@ def leaves(space: Any) -> list[Leaf]:
     if isinstance(space, VECTORS):
         return [Leaf((), space)]
     if not isinstance(space, COMPOUNDS):
-        raise UnsupportedSpace(f"a {type(space).__name__}: expected a real-vector space or a compound of them")
+        raise UnsupportedSpace(f"a {type(space).__name__}: expected a real vector, or a compound of some")
     return [Leaf((index, *leaf.path), leaf.space)
             for index in range(space.getSubspaceCount()) for leaf in leaves(space.getSubspace(index))]
 
@@ -68,7 +68,7 @@ def _write_vector(vector: Any, floats: Sequence[float]) -> None:
 def bounds(parts: list[Leaf]) -> tuple[list[float], list[float]]:
     """Return the lower and upper bounds of all floats."""
     boxes = [leaf.space.getBounds() for leaf in parts]
-    return sum((list(box.low) for box in boxes), []), sum((list(box.high) for box in boxes), [])
+    return [low for box in boxes for low in box.low], [high for box in boxes for high in box.high]
 
 
 def _part(value: Any, path: tuple[int, ...]) -> Any:

@@ -16,8 +16,8 @@ class NearestToRandom(Strategy):
     """[Matheron2020] Alg. 3 in the feature space (3.4.2): uniform target, nearest node by Euclidean distance.
 
     Differs: none with `batch=1`. Otherwise one target for each hundred nodes of the tree is drawn before any
-        of their nearest nodes is expanded, so that a target misses at most one percent of the nodes that it
-        might be nearest to.
+    of their nearest nodes is expanded, so that a target misses at most one percent of the nodes that it
+    might be nearest to.
 
     Raises:
         InvalidOption: on `start`, for a feature space without finite bounds.

@@ -11,7 +11,7 @@ from planners.tree_planner import StrategyPlanner
 
 
 class SteerToRandom(NearestToRandom):
-    """[Matheron2020] Alg. 2 in the feature space, with the environment's `advance_towards`; batches as in RRT-NH.
+    """[Matheron2020] Alg. 2 in the feature space, with the environment's `advance_towards`; batches as RRTNH.
 
     Raises:
         InvalidOption: on `start`, for an environment or OMPL problem that offers no steering.
@@ -25,7 +25,7 @@ class SteerToRandom(NearestToRandom):
         self._steer = space.steer
 
     def select(self, tree: Tree, count: int) -> IndexArray:
-        """Return the nodes that are nearest to `count` random targets; the targets are kept for `controls`."""
+        """Return the nodes that are nearest to `count` random targets, which `controls` will need."""
         self._targets = self.draw_targets(count)
         return self.nearest_to(tree, self._targets)
 

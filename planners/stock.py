@@ -58,20 +58,22 @@ class StockPlanner:
         try:
             return kind(si) if self.decomposition is None else kind(si, self.decomposition(si))
         except TypeError as error:
-            raise PlannerUnavailable(f"the installed OMPL {version('ompl')} cannot build {self.name} from Python: "
-                                     f"{str(error).splitlines()[0]}; use Ex, RRT, EST or KPIECE1") from error
+            reason = str(error).splitlines()[0]
+            raise PlannerUnavailable(f"the installed OMPL {version('ompl')} cannot build {self.name} from "
+                                     f"Python: {reason}; use Ex, RRT, EST or KPIECE1") from error
 
 
 def _set(planner: Any, name: str, option: str, setter: str, value: Any) -> None:
     try:
         getattr(planner, setter)(value)
     except TypeError as error:
-        raise InvalidOption(f"planner {name!r} refused {option}={value!r}: {str(error).splitlines()[0]}") from error
+        reason = str(error).splitlines()[0]
+        raise InvalidOption(f"planner {name!r} refused {option}={value!r}: {reason}") from error
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep OMPL from saying that it was seeded late; what is built afterwards follows the seed all the same."""
+    """Keep OMPL from saying that it was seeded late; what is built afterwards follows the seed even so."""
     level = ou.getLogLevel()
     ou.setLogLevel(ou.LOG_NONE)
     try:
@@ -80,7 +82,8 @@ def _quiet() -> Iterator[None]:
         ou.setLogLevel(level)
 
 
-RRT = StockPlanner("RRT", {"goal_bias": ("setGoalBias", 0.0), "intermediate_states": ("setIntermediateStates", False)})
+RRT = StockPlanner("RRT", {
+    "goal_bias": ("setGoalBias", 0.0), "intermediate_states": ("setIntermediateStates", False)})
 """Without goal bias, OMPL's default here, it is [Matheron2020] Alg. 3: nearest node, one random control."""
 EST = StockPlanner("EST", {"goal_bias": ("setGoalBias", None), "range": ("setRange", None)})
 KPIECE1 = StockPlanner("KPIECE1", {

@@ -66,7 +66,7 @@ class Strategy(ABC):
         low, high = self.space.action_low, self.space.action_high
         return low + (high - low) * self.rng.random((len(nodes), len(low)))
 
-    def inserted(self, tree: Tree, first: int, last: int) -> None:
+    def inserted(self, tree: Tree, first: int, last: int) -> None:  # noqa: B027 - optional
         """Learn of the new nodes first, ..., last - 1; some of them may be terminal."""
 
     @classmethod

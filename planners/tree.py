@@ -39,7 +39,8 @@ class Tree:
         expected: How many nodes there may be, if that is known: address space is reserved for them.
     """
 
-    def __init__(self, state_size: int, control_size: int, feature_size: int | None = None, *, expected: int = 0):
+    def __init__(self, state_size: int, control_size: int, feature_size: int | None = None, *,
+                 expected: int = 0):
         node_bytes = 8 * (state_size + (feature_size or 0) + control_size) + 13
         room = max(FIRST_ROOM, min(expected, MOST_RESERVED // node_bytes))
         states = np.empty((room, state_size))
@@ -89,7 +90,7 @@ class Tree:
 
     def append(self, states: Array, parents: Any, controls: Array | float, rewards: Array | float,
                terminal: BoolArray | bool, features: Array | None = None) -> None:
-        """Add B nodes: states [B, D], parents [B], ..., features [B, F] (left out where states are features)."""
+        """Add B nodes: states [B, D], ..., features [B, F]; no features where the states are them."""
         count = len(states)
         self.reserve(count)
         new = slice(self._size, self._size + count)

@@ -18,7 +18,7 @@ from planners.tree import Tree
 
 ErrorType = TypeVar("ErrorType", bound=Exception)
 CHUNK = 2048
-"""Expansions of one compiled call, between two looks at the termination condition: less than a millisecond."""
+"""Expansions of one compiled call, between two looks at the termination condition: about a millisecond."""
 
 
 class TreePlanner(ob.Planner):
@@ -47,6 +47,9 @@ class TreePlanner(ob.Planner):
         super().__init__(si, name)
         self._batch = None if batch == "grow" else positive_integer("batch", batch)
         self._strategy = strategy
+        self._compiled: CompiledStrategy | None = None
+        if self._batch in (None, 1) and isinstance(strategy, CompiledStrategy):
+            self._compiled = strategy
         self._seeds = SeedTree(seed)
         self._rng = self._seeds.child("strategy").generator()
         self._door: Door | None = None
@@ -94,7 +97,7 @@ class TreePlanner(ob.Planner):
         self._error = None
 
     def solve(self, ptc: Any) -> Any:
-        """Grow the tree until the goal, the end of the budget, or `ptc`: a condition, a callable or seconds."""
+        """Grow the tree until the goal, the budget's end, or `ptc` (a condition, a callable or seconds)."""
         self._error = None
         try:
             return ob.PlannerStatus(self._solve(_condition(ptc)))
@@ -105,11 +108,12 @@ class TreePlanner(ob.Planner):
         return ob.PlannerStatus(ob.PlannerStatus.ABORT)
 
     def planner_data(self) -> Any:
-        """Return the tree as new `ompl.base.PlannerData`, which cannot hold controls in the installed OMPL."""
+        """Return the tree as `ompl.base.PlannerData`, which cannot hold controls in the installed OMPL."""
         data = ob.PlannerData(self.getSpaceInformation())
         if self._door is None or self._tree is None:
             return data
-        states = [self._door.state(self._tree, node) for node in range(len(self._tree))]  # vertices only point to them
+        # Vertices only point to their states: all of these have to live until the data are decoupled.
+        states = [self._door.state(self._tree, node) for node in range(len(self._tree))]
         for state, parent in zip(states, self._tree.parents.tolist(), strict=True):
             vertex = ob.PlannerDataVertex(state)
             index = data.addStartVertex(vertex) if parent < 0 else data.addVertex(vertex)
@@ -157,9 +161,8 @@ class TreePlanner(ob.Planner):
     def _advance(self, door: Door, tree: Tree, goal: Any) -> int:
         """Expand a batch of nodes; return the node in the goal, or -1."""
         strategy, left, first = self._strategy, door.counter.left, len(tree)
-        if (isinstance(door, ModelDoor) and door.compiled is not None and self._batch in (None, 1)
-                and isinstance(strategy, CompiledStrategy)):
-            return _expand_compiled(strategy, door, tree, door.compiled, min(CHUNK, left))
+        if self._compiled is not None and isinstance(door, ModelDoor) and door.compiled is not None:
+            return _expand_compiled(self._compiled, door, tree, door.compiled, min(CHUNK, left))
         count = self._batch or min(strategy.batch(tree), door.widest_batch)
         nodes = _checked_nodes(strategy, tree, strategy.select(tree, min(count, left)), min(count, left))
         controls = _checked_controls(strategy, strategy.controls(tree, nodes), len(nodes))
@@ -190,10 +193,12 @@ class StrategyPlanner(TreePlanner):
 
 
 def _condition(ptc: Any) -> Any:
-    """Return the termination condition that `solve` was given, in any of the forms that OMPL's own planners take."""
+    """Return the termination condition that `solve` was given, in any form that OMPL's own planners take."""
     if isinstance(ptc, ob.PlannerTerminationCondition):
         return ptc
-    return ob.PlannerTerminationCondition(ptc) if callable(ptc) else ob.timedPlannerTerminationCondition(float(ptc))
+    if callable(ptc):
+        return ob.PlannerTerminationCondition(ptc)
+    return ob.timedPlannerTerminationCondition(float(ptc))
 
 
 def _without_own_frames(error: ErrorType) -> ErrorType:
@@ -212,7 +217,8 @@ def _failure(planner: str, error: Exception) -> CallbackFailed:
     return failure
 
 
-def _expand_compiled(strategy: CompiledStrategy, door: ModelDoor, tree: Tree, step: CompiledStep, count: int) -> int:
+def _expand_compiled(strategy: CompiledStrategy, door: ModelDoor, tree: Tree, step: CompiledStep,
+                     count: int) -> int:
     first = len(tree)
     reached = strategy.expand(tree, step, door.feature_dims, count)
     door.counter.count += len(tree) - first
@@ -252,6 +258,6 @@ def _checked_controls(strategy: Strategy, controls: Any, count: int) -> Array:
     inside = (controls >= space.action_low) & (controls <= space.action_high)
     if not inside.all():
         bad = controls[~inside.all(axis=1)][0]
-        raise CallbackFailed(f"{name} returned {bad.tolist()}; expected controls between {space.action_low.tolist()} and "
-                             f"{space.action_high.tolist()}")
+        raise CallbackFailed(f"{name} returned {bad.tolist()}; expected controls between "
+                             f"{space.action_low.tolist()} and {space.action_high.tolist()}")
     return controls

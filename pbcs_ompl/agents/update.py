@@ -71,6 +71,17 @@ class _CompiledOrNot:
 
 
 @contextmanager
+def one_thread() -> Iterator[None]:
+    """Let torch use one thread: small products gain nothing from more, and their number changes the rounding."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+@contextmanager
 def quick_arithmetic(work: int) -> Iterator[None]:
     """Run small products on one thread, and round denormal numbers to zero.
 

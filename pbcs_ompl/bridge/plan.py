@@ -93,7 +93,7 @@ def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
     setup.setPlanner(planner)
     setup.setup()
     stop = make_stop(watch, limits.max_seconds, on_progress)
-    with interruptible(watch):
+    with interruptible(lambda: watch.fail(KeyboardInterrupt())):
         began = time.perf_counter()
         try:
             planner.solve(ob.PlannerTerminationCondition(stop))

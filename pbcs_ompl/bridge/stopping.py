@@ -60,11 +60,11 @@ def make_stop(watch: Watch, max_seconds: float | None,
 
 
 @contextmanager
-def interruptible(watch: Watch) -> Iterator[None]:
-    """Let Ctrl-C end the planner at its next poll instead of raising inside one of OMPL's callbacks.
+def interruptible(on_interrupt: Callable[[], None]) -> Iterator[None]:
+    """Call `on_interrupt` at the first Ctrl-C instead of raising wherever the program happens to be.
 
-    A second Ctrl-C raises at once. Handlers that a host application has set, and other threads, are left
-    alone.
+    A planner must not be left through OMPL's C++, a training only between two of its steps. A second Ctrl-C raises at
+    once. Handlers that a host application has set, and other threads, are left alone.
     """
     usual = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or usual is not signal.default_int_handler:
@@ -72,8 +72,8 @@ def interruptible(watch: Watch) -> Iterator[None]:
         return
 
     def remember(number: int, frame: Any) -> None:
-        watch.fail(KeyboardInterrupt())
         signal.signal(signal.SIGINT, usual)
+        on_interrupt()
 
     signal.signal(signal.SIGINT, remember)
     try:

@@ -4,8 +4,6 @@ import shlex
 from argparse import Namespace
 from pathlib import Path
 
-import torch
-
 from pbcs_ompl.bridge.plan import TRAJECTORY
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.cli.arguments import build_parser
@@ -42,7 +40,6 @@ def run(arguments: Namespace) -> int:
 
 
 def _train(arguments: Namespace, out: Path) -> TrainResult:
-    torch.set_num_threads(1)  # for small matrices; threads would wait for each other, and change the rounding
     budget = {} if arguments.max_transitions is None else {"max_transitions": arguments.max_transitions}
     with Report("train", budget=arguments.max_transitions) as report:
         if arguments.resume:

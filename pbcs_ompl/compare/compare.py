@@ -78,6 +78,8 @@ def compare(planners: Sequence[str], env: str, *, env_kwargs: dict[str, Any] | N
     settings = _settings(planners, env, env_kwargs or {}, planner_kwargs or {}, seeds, limits)
     if jobs < 1:
         raise InvalidOption(f"jobs is {jobs}; expected at least 1")
+    for planner in settings["planners"]:
+        _why_unavailable(planner, settings["planner_kwargs"].get(planner, {}))
     folder = None if out is None else Path(out)
     with nullcontext() if folder is None else _open(folder, settings):
         records = _records(settings, jobs, folder, on_progress)
@@ -134,18 +136,21 @@ def _finished(jobs: Sequence[Job], folder: Path | None) -> Iterator[Record]:
 
 
 def _unavailable(jobs: Sequence[Job]) -> Iterator[Record]:
-    """Yield a record for each run of a planner that cannot be loaded here. A misspelt one is an error."""
-    reasons: dict[str, str | None] = {}
+    """Yield a record for each run of a planner that cannot be loaded here."""
+    reasons = {job.planner: _why_unavailable(job.planner, job.planner_kwargs) for job in jobs}
     for job in jobs:
-        if job.planner not in reasons:
-            try:
-                PlannerSpec(job.planner, job.planner_kwargs)
-                reasons[job.planner] = None
-            except (PlannerUnavailable, MissingDependency) as error:
-                reasons[job.planner] = str(error)
         reason = reasons[job.planner]
         if reason is not None:
             yield broken(job, reason)
+
+
+def _why_unavailable(planner: str, options: dict[str, Any]) -> str | None:
+    """Return why a planner cannot be loaded here, None when it can. A misspelt one is an error."""
+    try:
+        PlannerSpec(planner, options)
+    except (PlannerUnavailable, MissingDependency) as error:
+        return str(error)
+    return None
 
 
 def _report(records: dict[tuple[str, int], Record], on_progress: ProgressCallback | None) -> None:

@@ -35,6 +35,8 @@ def make(env_id: str, env_kwargs: dict[str, Any] | None = None) -> ResetAnywhere
         env = gymnasium.make(env_id, **kwargs)
     except (gymnasium.error.DependencyNotInstalled, ModuleNotFoundError) as error:
         raise MissingDependency(f"environment {env_id!r} needs what is not installed: {error}") from error
+    except (TypeError, ValueError) as error:
+        raise InvalidOption(f"{env_id} refuses its options {kwargs}: {error}") from error
     model = adapt(env)
     model.env_id = env_id  # with its module, if it names one
     return model

@@ -131,6 +131,11 @@ class Plain(OneSkill):
     def _first_start(self) -> int:
         return 0
 
+    @property
+    def covered(self) -> float:
+        """All or nothing."""
+        return float(self.done)
+
     def step(self) -> None:
         """Train for a session from the start, then test there."""
         state = self.state

@@ -7,12 +7,12 @@ import gymnasium
 
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.contracts import ProgressCallback, ResetAnywhere
-from pbcs_ompl.core.errors import DamagedFile, InvalidOption, TrainingStalled, UnknownName
-from pbcs_ompl.core.run_folder import CONFIG, RunFolder, read_toml
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, RunFolderError, TrainingStalled, UnknownName
+from pbcs_ompl.core.run_folder import CONFIG, RESULT, RunFolder, read_toml
 from pbcs_ompl.reset_anywhere import adapt, make
 from pbcs_ompl.skills.config import TrainConfig
 from pbcs_ompl.skills.result import TrainResult
-from pbcs_ompl.skills.training import Training
+from pbcs_ompl.skills.training import CHECKPOINT, Training
 
 
 def train(env: str | gymnasium.Env | ResetAnywhere, *, env_kwargs: dict[str, Any] | None = None,
@@ -59,6 +59,8 @@ def resume(folder: str | Path, *, max_transitions: int | None = None,
         DamagedFile: a file in the folder is damaged.
     """
     with RunFolder(folder, resume=True) as opened:
+        if (opened.path / RESULT).is_file() and not (opened.path / CHECKPOINT).is_file():
+            raise RunFolderError(f"the training in {opened.path} has ended; there is nothing to resume")
         values = read_toml(opened.path / CONFIG)
         try:
             env, env_kwargs = values.pop("env"), values.pop("env_kwargs", {})

@@ -1,12 +1,15 @@
 """One training: plan, train skills along the plan, evaluate; it can be stopped and resumed at any moment."""
 
+import threading
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pbcs_ompl.agents.update import one_thread
 from pbcs_ompl.bridge.plan import plan
+from pbcs_ompl.bridge.stopping import interruptible
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.contracts import Counter, ProgressCallback, ResetAnywhere
 from pbcs_ompl.core.errors import CallbackFailed, Mismatch, PbcsError
@@ -51,6 +54,10 @@ class Training:
 
     def run(self, trajectory: Trajectory | None) -> TrainResult:
         """Plan (or take the plan that is given or was made before), train, evaluate and write."""
+        with one_thread():
+            return self._run(trajectory)
+
+    def _run(self, trajectory: Trajectory | None) -> TrainResult:
         self._write_config()
         trajectory, planned = self._plan(trajectory)
         if trajectory is None and self.config.method != "plain":
@@ -107,24 +114,28 @@ class Training:
 
     def _train(self, method: Method) -> str | None:
         """Step until the method is done; return why it ended early, or None."""
-        try:
+        stop = threading.Event()
+        with interruptible(stop.set):
             while not method.done:
                 if method.learner.counter.left <= 0:
                     self._checkpoint(method)
                     return (f"the budget of {self.config.max_transitions} transitions is used up, with "
                             f"{method.covered:.0%} of the plan covered")
-                method.step()
+                self._step(method)
                 self._report(method)
-                if time.perf_counter() - self.last_checkpoint > CHECKPOINT_SECONDS:
+                if stop.is_set() or time.perf_counter() - self.last_checkpoint > CHECKPOINT_SECONDS:
                     self._checkpoint(method)
-        except KeyboardInterrupt:
-            self._checkpoint(method)
-            raise
+                if stop.is_set():
+                    raise KeyboardInterrupt
+        return None
+
+    def _step(self, method: Method) -> None:
+        try:
+            method.step()
         except PbcsError:
             raise
         except Exception as error:
             raise CallbackFailed(f"the environment or the agent raised while training: {error!r}") from error
-        return None
 
     def _checkpoint(self, method: Method) -> None:
         if self.path:
@@ -163,8 +174,13 @@ class Training:
             self.on_progress({"phase": "plan", **numbers})
 
     def _report(self, method: Method) -> None:
-        if self.on_progress:
-            learner = method.learner
+        if self.on_progress is None:
+            return
+        learner = method.learner
+        try:
             self.on_progress({"phase": "train", "transitions": learner.counter.count, "updates": learner.updates,
                               "covered": method.covered, "skills": len(method.skills),
                               "seconds": time.perf_counter() - self.began})
+        except KeyboardInterrupt:  # a caller may end a training from here
+            self._checkpoint(method)
+            raise

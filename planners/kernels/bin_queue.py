@@ -16,6 +16,7 @@ from planners.kernels.runs import MEMBER, RUN, append, choose
 
 SMALLEST = 2  # log2 of the rows of a new bin's slice
 CLASSES = 32  # slice sizes 2**0 .. 2**31
+Number = int | np.int64  # what compiled functions return is one of them, depending on who calls
 START, LENGTH, SIZE = 0, 1, 2  # columns of `slices`
 BINS, POOL = 0, 1  # entries of `used`
 GROWTH = 4  # of the arrays; rooms cost address space only
@@ -26,7 +27,7 @@ class BinQueue(NamedTuple):
     """The arrays. R rows of the pool, M rooms for bins, F features, H hash cells (a power of two)."""
 
     pool: NDArray[np.int32]
-    """Node queues of all bins [R, 3]; the first row of a free slice holds the next free slice of its size, or -1."""
+    """Node queues of all bins [R, 3]; a free slice's first row is the next free slice of its size, or -1."""
     slices: NDArray[np.int32]
     """Of each bin: first row in the pool, length, log2 of the rows [M, 3]."""
     order: NDArray[np.int32]
@@ -66,7 +67,7 @@ def empty_queue(num_features: int) -> BinQueue:
 
 def insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_], size: NDArray[np.float64],
            first: int) -> BinQueue:
-    """Insert nodes first, first + 1, ... of features [B, F], leaving out those of `skip` [B]; return the queue.
+    """Insert nodes first, first + 1, ... of features [B, F] except those of `skip` [B]; return the queue.
 
     Arrays that were too small are replaced; the queue that was passed is not to be used any more.
     """
@@ -79,44 +80,29 @@ def insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool
 
 @njit(cache=True)
 def select(queue: BinQueue, uniforms: NDArray[np.float64], nodes: NDArray[np.int64]) -> None:
-    """Write into `nodes` [B] as many selections in a row, by uniform numbers in [0, 1) [B, 2]: bin, then node."""
+    """Write into `nodes` [B] as many selections in a row, by numbers uniform in [0, 1) [B, 2]: bin, node."""
+    pool, slices, order, bins = queue.pool, queue.slices, queue.order, queue.used[BINS]
     for i in range(len(nodes)):
-        nodes[i] = select_one(queue, uniforms[i, 0], uniforms[i, 1])
-
-
-@njit(cache=True, inline="always")
-def select_one(queue: BinQueue, for_bin: float, for_node: float) -> int:
-    """Return a node of the lowest count in a bin of the lowest count; raise both counts."""
-    chosen = choose(queue.order, 0, queue.used[BINS], for_bin)
-    return choose(queue.pool, queue.slices[chosen, START], queue.slices[chosen, LENGTH], for_node)
-
-
-@njit(cache=True, inline="always")
-def insert_one(queue: BinQueue, features: NDArray[np.float64], row: int, size: NDArray[np.float64], node: int,
-               cell: NDArray[np.int64]) -> bool:
-    """Insert a node of count 0 with features[row]; return False, and change nothing, where an array is full.
-
-    `cell` [F] is scratch: memory is allocated nowhere in these kernels.
-    """
-    for axis in range(len(cell)):
-        scaled = np.floor(features[row, axis] / size[axis])
-        cell[axis] = int(min(max(scaled, -FARTHEST), FARTHEST))
-    place = find_cell(queue.cells, queue.table, cell)
-    found = np.int64(queue.table[place]) - 1
-    if found < 0:
-        found = _new_bin(queue, cell, place)
-        if found < 0:
-            return False
-    length = np.int64(queue.slices[found, LENGTH])
-    if length == 1 << queue.slices[found, SIZE] and not _double(queue, found):
-        return False
-    append(queue.pool, queue.slices[found, START], length, node)
-    queue.slices[found, LENGTH] = length + 1
-    return True
+        number = choose(order, 0, bins, uniforms[i, 0])
+        nodes[i] = choose(pool, slices[number, START], slices[number, LENGTH], uniforms[i, 1])
 
 
 @njit(cache=True)
-def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[np.int64]) -> int:
+def tied_bins(queue: BinQueue) -> int:
+    """Return how many bins share the lowest count."""
+    bins = queue.used[BINS]
+    return bins - queue.order[bins - 1, RUN]
+
+
+@njit(cache=True)
+def cell_of(features: NDArray[np.float64], row: int, size: NDArray[np.float64], cell: NDArray[np.int64]) -> None:
+    """Write the coordinates floor(feature / size) of features[row] into `cell` [F]."""
+    for axis in range(len(cell)):
+        cell[axis] = int(min(max(np.floor(features[row, axis] / size[axis]), -FARTHEST), FARTHEST))
+
+
+@njit(cache=True, inline="always")
+def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[np.int64]) -> Number:
     """Return the position in `table` of a cell [F], or of the empty place where it belongs."""
     mixed = np.uint64(0)
     for axis in range(len(cell)):
@@ -133,32 +119,62 @@ def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[
     return place
 
 
+@njit(cache=True, inline="always")
+def add(pool: NDArray[np.int32], slices: NDArray[np.int32], number: int, node: int) -> bool:
+    """Add a node of count 0 to a bin; return False where the bin is full, or there is none (number -1)."""
+    if number < 0:
+        return False
+    length = np.int64(slices[number, LENGTH])
+    if length == 1 << slices[number, SIZE]:
+        return False
+    append(pool, slices[number, START], length, node)
+    slices[number, LENGTH] = length + 1
+    return True
+
+
 @njit(cache=True)
-def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_], size: NDArray[np.float64],
-            first: int, done: int) -> int:
+def make_room_and_add(queue: BinQueue, cell: NDArray[np.int64], place: int, node: int) -> bool:
+    """Add a node where `add` could not: open its bin, or double it. Return False where an array is full."""
+    number = np.int64(queue.table[place]) - 1
+    if number < 0:
+        number = _new_bin(queue, cell, place)
+        if number < 0:
+            return False
+    elif not _double(queue, number):
+        return False
+    return add(queue.pool, queue.slices, number, node)
+
+
+@njit(cache=True)
+def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_],
+            size: NDArray[np.float64], first: int, done: int) -> int:
     """Insert from position `done` on; return where an array was full."""
+    pool, slices, cells, table = queue.pool, queue.slices, queue.cells, queue.table
     cell = np.empty(features.shape[1], np.int64)
     while done < len(features):
-        if not skip[done] and not insert_one(queue, features, done, size, first + done, cell):
-            return done
+        if not skip[done]:
+            cell_of(features, done, size, cell)
+            place = find_cell(cells, table, cell)
+            if not (add(pool, slices, table[place] - 1, first + done)
+                    or make_room_and_add(queue, cell, place, first + done)):
+                return done
         done += 1
     return done
 
 
 @njit(cache=True)
-def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: int) -> int:
+def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: int) -> Number:
     """Open a bin at a place of the hash table; return -1 if there is no room for one."""
     number = np.int64(queue.used[BINS])
     if number == len(queue.slices):
         return -1
-    start = _take(queue, SMALLEST)
+    start = _take(queue.pool, queue.free, queue.used, SMALLEST)
     if start < 0:
         return -1
+    slices, cells = queue.slices, queue.cells
     for axis in range(len(cell)):
-        queue.cells[number, axis] = cell[axis]
-    queue.slices[number, START] = start
-    queue.slices[number, LENGTH] = 0
-    queue.slices[number, SIZE] = SMALLEST
+        cells[number, axis] = cell[axis]
+    slices[number, START], slices[number, LENGTH], slices[number, SIZE] = start, 0, SMALLEST
     queue.table[place] = number + 1
     append(queue.order, 0, number, number)
     queue.used[BINS] += 1
@@ -168,32 +184,32 @@ def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: int) -> int:
 @njit(cache=True)
 def _double(queue: BinQueue, number: int) -> bool:
     """Move a full bin to a slice of twice the size; return whether there was room."""
-    start, length = np.int64(queue.slices[number, START]), np.int64(queue.slices[number, LENGTH])
-    size = np.int64(queue.slices[number, SIZE])
-    moved = _take(queue, size + 1)
+    pool, slices, free = queue.pool, queue.slices, queue.free
+    start, length = np.int64(slices[number, START]), np.int64(slices[number, LENGTH])
+    size = np.int64(slices[number, SIZE])
+    moved = _take(pool, free, queue.used, size + 1)
     if moved < 0:
         return False
     for row in range(length):
         for column in range(3):
-            queue.pool[moved + row, column] = queue.pool[start + row, column]
-    queue.pool[start, MEMBER] = queue.free[size]
-    queue.free[size] = start
-    queue.slices[number, START] = moved
-    queue.slices[number, SIZE] = size + 1
+            pool[moved + row, column] = pool[start + row, column]
+    pool[start, MEMBER] = free[size]
+    free[size] = start
+    slices[number, START], slices[number, SIZE] = moved, size + 1
     return True
 
 
 @njit(cache=True)
-def _take(queue: BinQueue, size: int) -> int:
+def _take(pool: NDArray[np.int32], free: NDArray[np.int32], used: NDArray[np.int64], size: int) -> Number:
     """Return the first row of a slice of 2**size rows, or -1."""
-    start = np.int64(queue.free[size])
+    start = np.int64(free[size])
     if start >= 0:
-        queue.free[size] = queue.pool[start, MEMBER]
+        free[size] = pool[start, MEMBER]
         return start
-    start = queue.used[POOL]
-    if start + (1 << size) > len(queue.pool):
+    start = used[POOL]
+    if start + (1 << size) > len(pool):
         return -1
-    queue.used[POOL] += 1 << size
+    used[POOL] += 1 << size
     return start
 
 
@@ -222,10 +238,3 @@ def _enlarged(array: np.ndarray, used: int, rows: int) -> np.ndarray:
 def _rehash(cells: NDArray[np.int64], table: NDArray[np.int32], bins: int) -> None:
     for number in range(bins):
         table[find_cell(cells, table, cells[number])] = number + 1
-
-
-@njit(cache=True)
-def tied_bins(queue: BinQueue) -> int:
-    """Return how many bins share the lowest count."""
-    bins = queue.used[BINS]
-    return bins - queue.order[bins - 1, RUN]

@@ -11,12 +11,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pbcs_ompl.core.contracts import Array, IndexArray
+
+Items = NDArray[np.int32]
 LEAF = 32
 DEPTH = 64
 
 
 @njit(cache=True)
-def insert(points: NDArray[np.float64], items: NDArray[np.int32], size: int, item: int) -> int:
+def insert(points: Array, items: Items, size: int, item: int) -> int:
     """Add row `item` of points [N, F] as entry number `size` of items [R]; return the new size."""
     items[size] = item
     size += 1
@@ -26,8 +29,7 @@ def insert(points: NDArray[np.float64], items: NDArray[np.int32], size: int, ite
 
 
 @njit(cache=True)
-def nearest(points: NDArray[np.float64], items: NDArray[np.int32], size: int, targets: NDArray[np.float64],
-            found: NDArray[np.int64]) -> None:
+def nearest(points: Array, items: Items, size: int, targets: Array, found: IndexArray) -> None:
     """Write into found [B] the items whose points are nearest to targets [B, F], of `size` > 0 items."""
     stack = np.empty((DEPTH, 3), np.int64)
     gaps = np.empty(DEPTH)
@@ -36,8 +38,8 @@ def nearest(points: NDArray[np.float64], items: NDArray[np.int32], size: int, ta
         first, rest = 0, size - size % LEAF
         while rest > 0:
             segment = _highest_bit(rest)
-            best, best_squared = _search(points, items, first, first + segment, targets, row, best, best_squared,
-                                         stack, gaps)
+            best, best_squared = _search(points, items, first, first + segment, targets, row, best,
+                                         best_squared, stack, gaps)
             first += segment
             rest -= segment
         best, best_squared = _scan(points, items, first, size, targets, row, best, best_squared)
@@ -53,7 +55,8 @@ def _highest_bit(number: int) -> int:
 
 
 @njit(cache=True, inline="always")
-def _scan(points, items, low, high, targets, row, best, best_squared):
+def _scan(points: Array, items: Items, low: int, high: int, targets: Array, row: int,
+          best: int, best_squared: float) -> tuple[int, float]:
     for place in range(low, high):
         squared = 0.0
         for axis in range(points.shape[1]):
@@ -65,7 +68,8 @@ def _scan(points, items, low, high, targets, row, best, best_squared):
 
 
 @njit(cache=True)
-def _search(points, items, low, high, targets, row, best, best_squared, stack, gaps):
+def _search(points: Array, items: Items, low: int, high: int, targets: Array, row: int,
+            best: int, best_squared: float, stack: IndexArray, gaps: Array) -> tuple[int, float]:
     """Search one k-d tree; keep on the stack the farther halves with the squared gap to their plane."""
     axes = points.shape[1]
     stack[0, 0], stack[0, 1], stack[0, 2] = low, high, 0
@@ -95,7 +99,7 @@ def _search(points, items, low, high, targets, row, best, best_squared, stack, g
 
 
 @njit(cache=True)
-def _build(points, items, low, high):
+def _build(points: Array, items: Items, low: int, high: int) -> None:
     """Arrange items[low:high] as an implicit k-d tree, each range around the median of its axis."""
     stack = np.empty((DEPTH, 3), np.int64)
     stack[0, 0], stack[0, 1], stack[0, 2] = low, high, 0
@@ -113,8 +117,8 @@ def _build(points, items, low, high):
 
 
 @njit(cache=True)
-def _place_median(points, items, low, high, middle, axis):
-    """Move the item that belongs at `middle` there, smaller ones before it, larger ones behind (Hoare's selection)."""
+def _place_median(points: Array, items: Items, low: int, high: int, middle: int, axis: int) -> None:
+    """Move the item that belongs at `middle` there, smaller ones before it, larger ones behind (Hoare)."""
     last = high - 1
     while low < last:
         pivot = points[items[(low + last) // 2], axis]

@@ -14,9 +14,9 @@ MEMBER, COUNT, RUN = 0, 1, 2
 Entries = NDArray[np.int32]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def append(entries: Entries, start: int, length: int, member: int) -> None:
-    """Write a member of count 0 behind the `length` members of the queue. The caller owns the room and the length."""
+    """Write a member of count 0 behind the `length` members of the queue; there must be room."""
     row = start + length
     run = length
     if length > 0 and entries[row - 1, COUNT] == 0:
@@ -26,7 +26,7 @@ def append(entries: Entries, start: int, length: int, member: int) -> None:
     entries[row, RUN] = run
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def choose(entries: Entries, start: int, length: int, uniform: float) -> int:
     """Return a random member of the lowest run, by a number uniform in [0, 1), and raise its count by one.
 

@@ -27,7 +27,7 @@ def draw_sparse(queue: BinQueue, reach: int, rng: np.random.Generator, nodes: ND
 
 
 @njit(cache=True)
-def _around(queue, number, reach, cell):
+def _around(queue: BinQueue, number: int, reach: int, cell: NDArray[np.int64]) -> int:
     """Return how many nodes are in the bins around one, itself included."""
     axes = len(cell)
     width = 2 * reach + 1

@@ -48,7 +48,7 @@ def walled_in(size: int) -> dict[str, Any]:
 
 
 def plain_problem(model: Any, cells: Any, threshold: float) -> tuple[Any, list[int]]:
-    """Return a plain OMPL problem around `step_one` with projection cells of size [2], and its count of propagations."""
+    """Return a plain OMPL problem around `step_one`, its projection in `cells` [2], and its propagations."""
     space = ob.RealVectorStateSpace(2)
     box = ob.RealVectorBounds(2)
     box.setLow(0.0)
@@ -91,8 +91,9 @@ def plain_rate(name: str, size: int, seconds: float) -> float:
 
 
 def plan_rate(name: str, size: int, seed: int, transitions: int) -> float:
-    """Return the propagations per second of a planner through the public API, until the budget or the goal."""
-    result = plan(MAZE, name, env_kwargs={"size": size, "maze_seed": seed}, seed=seed, max_transitions=transitions)
+    """Return the propagations per second of a planner through `plan`, until the budget or the goal."""
+    maze = {"size": size, "maze_seed": seed}
+    result = plan(MAZE, name, env_kwargs=maze, seed=seed, max_transitions=transitions)
     return result.transitions / result.seconds
 
 
@@ -130,7 +131,8 @@ def growing_tree(size: int, nodes: list[int]) -> None:
         count = len(planner.tree)
         print(f"Ex on a {size}x{size} maze without a reachable goal")
         for goal, rate in rates.items():
-            print(f"  rate near {goal:>10,} nodes {rate:>12,.0f} /s   {rate / rates[nodes[0]]:.2f} of the first  (bar .75)")
+            share = rate / rates[nodes[0]]
+            print(f"  rate near {goal:>10,} nodes {rate:>12,.0f} /s   {share:.2f} of the first  (bar .75)")
         print(f"  bytes a node: {(planner.tree.nbytes + planner.strategy.nbytes) / count:.0f} in arrays, "
               f"{peak / count:.0f} of peak resident memory  (bar 110)")
 
@@ -144,7 +146,8 @@ def grow(planner: Any, counter: Counter, nodes: int) -> None:
 
 def first_solutions(size: int, mazes: int, cap: float) -> None:
     """Print the third table."""
-    ex = median(plan(MAZE, "Ex", env_kwargs={"size": size, "maze_seed": seed}, seed=seed).seconds for seed in range(mazes))
+    ex = median(plan(MAZE, "Ex", env_kwargs={"size": size, "maze_seed": seed}, seed=seed).seconds
+                for seed in range(mazes))
     print(f"median wall seconds to the first solution, {mazes} mazes {size}x{size}, capped at {cap:.0f}")
     print(f"  {'Ex':<10}{ex:>9.4f}\n  {'':<10}{'OMPL default cells':>30}{'cells as bins of Ex':>30}")
     best = {0.05 * size: np.inf, 0.1: np.inf}
@@ -154,12 +157,14 @@ def first_solutions(size: int, mazes: int, cap: float) -> None:
             for cell in best:
                 times = [plain_solution(name, size, seed, cell, cap) for seed in range(mazes)]
                 best[cell] = min(best[cell], median(times))
-                texts.append(f"{median(times):>10.4f} {median(times) / ex:>5.0f} x Ex, {sum(t < cap for t in times):>2} solved")
+                solved = sum(seconds < cap for seconds in times)
+                texts.append(f"{median(times):>10.4f} {median(times) / ex:>5.0f} x Ex, {solved:>2} solved")
             print(f"  {name:<10}{texts[0]:>30}{texts[1]:>30}")
         except PlannerUnavailable:
             print(f"  {name:<10}{'not offered by the installed OMPL':>60}")
     default, small = best.values()
-    print(f"  fastest of OMPL / Ex: {default / ex:.0f} with default cells (bar 50), {small / ex:.1f} with Ex's bins")
+    print(f"  fastest of OMPL / Ex: {default / ex:.0f} with default cells (bar 50), "
+          f"{small / ex:.1f} with Ex's bins")
 
 
 def plain_solution(name: str, size: int, maze_seed: int, cell: float, cap: float) -> float:
@@ -175,7 +180,7 @@ def plain_solution(name: str, size: int, maze_seed: int, cell: float, cap: float
 
 def main() -> None:
     """Run all three."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description="Measure Ex against OMPL's planners.")
     parser.add_argument("--quick", action="store_true", help="trees up to 1e6 nodes, three mazes, short runs")
     quick = parser.parse_args().quick
     ou.setLogLevel(ou.LOG_NONE)

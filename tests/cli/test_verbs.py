@@ -2,6 +2,8 @@
 
 import json
 import shlex
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -161,6 +163,30 @@ def test_a_mistake_is_one_line_and_leaves_nothing_behind(pbcs, tmp_path, line, s
     assert error.count("\n") == 1
     assert expected in error
     assert [path for path in sorted(tmp_path.rglob("*")) if path not in before and path.is_file()] == []
+
+
+BROKEN = """
+from planners import Strategy
+
+class Broken(Strategy):
+    def select(self, tree, count):
+        raise {error}
+"""
+
+
+@pytest.mark.parametrize(("error", "status", "expected"), [
+    ("ValueError('oops')", 2, "pbcs: error: Broken met an exception in the environment, goal or strategy: "),
+    ("KeyboardInterrupt", 130, "pbcs: interrupted; run the same command again to start over"),
+])
+def test_a_users_exception_is_one_line_even_at_exit(tmp_path, error, status, expected):
+    """In a process of its own, because OMPL's bindings report what is left only when Python ends."""
+    (tmp_path / "broken.py").write_text(BROKEN.format(error=error))
+    command = [sys.executable, "-m", "pbcs_ompl.cli", *shlex.split(f"plan {MAZE} --planner broken:Broken")]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == status
+    assert run.stderr.startswith(expected)
+    assert run.stderr.count("\n") == 1
+    assert run.stdout == ""
 
 
 def test_two_plans_of_one_environment_do_not_mix(pbcs):

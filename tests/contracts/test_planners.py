@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from ompl import base as ob
+from ompl import control as oc
 
 from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.core import registry
@@ -13,15 +14,29 @@ from pbcs_ompl.reset_anywhere import make
 BUDGET = 60_000
 
 
-@pytest.fixture(scope="module", params=registry.names("planner"))
+def buildable():
+    """Return the names of the planners that the installed OMPL can build, by trying on an empty problem."""
+    space = ob.RealVectorStateSpace(2)
+    box = ob.RealVectorBounds(2)
+    box.setLow(0.0)
+    box.setHigh(1.0)
+    space.setBounds(box)
+    controls = oc.RealVectorControlSpace(space, 2)
+    controls.setBounds(box)
+    names = []
+    for name in registry.names("planner"):
+        try:
+            registry.load("planner", name).build(oc.SpaceInformation(space, controls), seed=1)
+        except PlannerUnavailable:
+            continue
+        names.append(name)
+    return names
+
+
+@pytest.fixture(scope="module", params=buildable())
 def entry(request):
-    """A registered planner that the installed OMPL can build, and whether it can be expected to find the goal."""
-    entry = registry.load("planner", request.param)
-    try:
-        search(entry, seed=1, budget=1)
-    except PlannerUnavailable as error:
-        pytest.skip(str(error))
-    return entry
+    """A registered planner that the installed OMPL can build."""
+    return registry.load("planner", request.param)
 
 
 def search(entry, seed, budget, **options):
@@ -34,7 +49,8 @@ def search(entry, seed, budget, **options):
             planner.use_model(model, counter)
         setup.setPlanner(planner)
         setup.setup()
-        status = planner.solve(ob.PlannerTerminationCondition(lambda: counter.left == 0 or problem.watch.stopped))
+        watch = problem.watch
+        status = planner.solve(ob.PlannerTerminationCondition(lambda: watch.stopped))
         problem.watch.raise_error()
         count, states, controls, checked = counter.count, np.empty((0, 2)), np.empty((0, 2)), True
         if setup.haveExactSolutionPath():

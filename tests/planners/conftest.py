@@ -25,7 +25,7 @@ def _compiled(reals, table, integers, states, parent, controls, child):
 
 
 class Square:
-    """s' = s + a within [0, extent]^2, else s' = s; success within `radius` of (goal, goal) in the maximum norm."""
+    """s' = s + a within [0, extent]^2, else s' = s; success within `radius` of (goal, goal), maximum norm."""
 
     env_id, env_kwargs, capabilities = "tests/Square", {}, frozenset({"visited", "arbitrary", "exact"})
     observation_size, max_episode_steps = 2, 50

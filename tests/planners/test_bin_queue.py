@@ -1,4 +1,4 @@
-"""The bin queue is [Matheron2020] Alg. 5: against a plain transcription, against brute force, and its ties."""
+"""The bin queue is [Matheron2020] Alg. 5: against a plain transcription, and against brute force."""
 
 from collections import defaultdict
 
@@ -53,7 +53,8 @@ def counts_of(queue):
     for member, count, _ in queue.order[:queue.used[BINS]].tolist():
         start, length = queue.slices[member, START], queue.slices[member, LENGTH]
         rows = queue.pool[start:start + length]
-        bins[tuple(queue.cells[member])] = (count, dict(zip(rows[:, MEMBER].tolist(), rows[:, COUNT].tolist(), strict=True)))
+        inside = dict(zip(rows[:, MEMBER].tolist(), rows[:, COUNT].tolist(), strict=True))
+        bins[tuple(queue.cells[member])] = (count, inside)
     return bins
 
 
@@ -97,7 +98,7 @@ def test_a_batch_of_selections_is_the_selections_one_by_one():
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 120), st.sampled_from([0.05, 0.4, 3.0]))
 def test_counters_by_brute_force(seed, operations, spread):
-    """c_b is the sum of c_s; the selected bin has the least c_b, the selected node the least c_s of its bin."""
+    """c_b is the sum of c_s; the selected bin has the least c_b, the selected node the least c_s in it."""
     rng, size, nodes = np.random.default_rng(seed), np.full(2, 0.5), np.empty(1, np.int64)
     points = np.zeros((operations + 1, 2))
     queue = insert(empty_queue(2), points[:1], np.zeros(1, bool), size, 0)
@@ -116,7 +117,7 @@ def test_counters_by_brute_force(seed, operations, spread):
 
 
 def test_ties_are_broken_uniformly():
-    """Of 5 tied bins with 3 tied nodes each, every node is selected first equally often (chi squared, p > 1e-4)."""
+    """Of 5 tied bins with 3 tied nodes each, all nodes are first equally often (chi squared, p > 1e-4)."""
     points = np.repeat(np.arange(5.0), 3)[:, None] + 0.5
     rng, hits, nodes = np.random.default_rng(5), np.zeros(15), np.empty(1, np.int64)
     for _ in range(6000):
@@ -145,6 +146,7 @@ def test_large_trees_keep_every_node_once():
     rng = np.random.default_rng(7)
     points = rng.normal(0, 30, (300_000, 2))
     queue = insert(empty_queue(2), points, np.zeros(len(points), bool), np.ones(2), 0)
-    members = [queue.pool[start:start + length, MEMBER] for start, length, _ in queue.slices[:queue.used[BINS]]]
+    slices = queue.slices[:queue.used[BINS]]
+    members = [queue.pool[start:start + length, MEMBER] for start, length, _ in slices]
     assert np.array_equal(np.sort(np.concatenate(members)), np.arange(len(points)))
     assert queue.used[BINS] == len(np.unique(np.floor(points), axis=0))

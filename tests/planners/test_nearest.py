@@ -37,9 +37,10 @@ def test_equals_brute_force(seed, count, features, decimals):
     check(points, rng.uniform(-8, 8, (20, features)))
 
 
-@pytest.mark.parametrize("points", [np.zeros((3000, 2)), np.arange(3000.0)[:, None], np.arange(3000.0)[::-1, None].copy(),
-                                    np.arange(6000.0).reshape(3000, 2) ** 2],
-                         ids=["all equal", "rising", "falling", "on a curve"])
+@pytest.mark.parametrize("points", [
+    np.zeros((3000, 2)), np.arange(3000.0)[:, None], np.arange(3000.0)[::-1, None].copy(),
+    np.arange(6000.0).reshape(3000, 2) ** 2,
+], ids=["all equal", "rising", "falling", "on a curve"])
 def test_no_order_degenerates_it(points):
     check(points, np.linspace(-10, 4000, 30)[:, None] * np.ones(points.shape[1]))
 

@@ -10,7 +10,8 @@ from planners.rrt_nh import NearestToRandom
 
 
 def space(features=2, **others):
-    return Space(np.zeros(features), np.full(features, 4.0), np.full(features, 0.5), np.full(2, -0.1), np.full(2, 0.1), **others)
+    return Space(np.zeros(features), np.full(features, 4.0), np.full(features, 0.5), np.full(2, -0.1),
+                 np.full(2, 0.1), **others)
 
 
 def tree_of(points, terminal=False):
@@ -21,7 +22,7 @@ def tree_of(points, terminal=False):
 
 @pytest.mark.parametrize("features", [1, 2, 3, 5])
 def test_est_draws_nodes_by_the_inverse_of_omega(features):
-    """A node's frequency goes with 1 / (nodes in the 3^F cells around it); beyond 4 features, in its cell alone."""
+    """A node's frequency goes with 1 / (nodes in the 3^F cells around it); beyond 4 features, in its cell."""
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(2.0, 0.2, (40, features)), rng.uniform(0, 4, (20, features))])
     strategy = SparseFirst()
@@ -57,9 +58,9 @@ def test_rrt_needs_a_box():
 
 
 def test_steering_reaches_the_goal_in_fewer_transitions(solve, square):
-    counts = [np.median([solve(lambda si, s=seed, k=kind: k(si, seed=s), square(), 50_000)[2].count for seed in range(5)])
-              for kind in (RRTSteered, RRTNH)]
-    assert counts[0] < 0.5 * counts[1]
+    steered, random = (np.median([solve(lambda si, s=seed, k=kind: k(si, seed=s), square(), 50_000)[2].count
+                                  for seed in range(5)]) for kind in (RRTSteered, RRTNH))
+    assert steered < 0.5 * random
 
 
 def test_no_steering_is_named(solve, square):

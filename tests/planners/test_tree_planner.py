@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from ompl import base as ob
 
-from pbcs_ompl.core.contracts import Counter, Transition
+from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, Mismatch
 from planners import RRTNH, ESTAdapted, Ex, RandomWalk, RRTSteered, Strategy, Tree
 
@@ -71,7 +71,8 @@ def test_budgets_are_kept_to_the_transition(solve, square, kind, budget):
 @pytest.mark.parametrize("kind", OURS, ids=lambda kind: kind.__name__)
 @pytest.mark.parametrize("batch", ["grow", 1, 64])
 def test_equal_seeds_give_equal_trees(solve, square, kind, batch):
-    trees = [solve(lambda si, s=seed: kind(si, seed=s, batch=batch), square(goal=9.0), 500)[0].tree for seed in (5, 5, 6)]
+    trees = [solve(lambda si, s=seed: kind(si, seed=s, batch=batch), square(goal=9.0), 500)[0].tree
+             for seed in (5, 5, 6)]
     assert np.array_equal(trees[0].states, trees[1].states)
     assert not np.array_equal(trees[0].states, trees[2].states)
 
@@ -81,9 +82,10 @@ def test_a_users_strategy_becomes_a_planner(solve, square):
     planner, status, counter, _ = solve(make, square(extent=1.0, goal=0.9), 50_000)
     assert status == EXACT
     assert planner.getName() == "Uniform"
-    assert planner.strategy.seen[0] == (0, 1)
-    assert [first for first, _ in planner.strategy.seen[1:]] == [last for _, last in planner.strategy.seen[:-1]]
-    assert planner.strategy.seen[-1][1] == counter.count + 1
+    seen = planner.strategy.seen
+    assert seen[0] == (0, 1)
+    assert [first for first, _ in seen[1:]] == [last for _, last in seen[:-1]]
+    assert seen[-1][1] == counter.count + 1
 
 
 def test_features_that_are_no_dimensions_of_the_state(solve, square):
@@ -174,11 +176,14 @@ def test_bad_models_are_named(solve, square, bad):
             result = super().transition(states, controls)
             if bad == "raises":
                 raise RuntimeError("no contact")
-            return result._replace(states=result.states * np.nan) if bad == "nan" else Transition(*result[:3], result[3][:0])
+            if bad == "nan":
+                return result._replace(states=result.states * np.nan)
+            return result._replace(success=result.success[:0])
 
     planner, status, _, _ = solve(lambda si: Ex(si), Bad())
     assert status == ABORT
-    expected = {"nan": r"from state \[0.5, 0.5\] with control", "shape": "success of shape", "raises": "no contact"}[bad]
+    expected = {"nan": r"from state \[0.5, 0.5\] with control", "shape": "success of shape",
+                "raises": "no contact"}[bad]
     with pytest.raises(CallbackFailed, match=expected):
         raise planner.error
 

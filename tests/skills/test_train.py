@@ -1,6 +1,7 @@
 """Training end to end: it solves, repeats itself, stops anywhere and goes on; its mistakes are named."""
 
 import json
+import signal
 import subprocess
 import sys
 
@@ -67,18 +68,43 @@ class StopAfter:
             raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("method", ["pbcs", "pb", "backplay"])
-def test_an_interrupted_training_goes_on_bit_for_bit(tmp_path, method):
-    options = {"env_kwargs": MAZE, "seed": 1, "method": method, "settings": {"verify_episodes": 20}}
+def test_a_signal_stops_between_two_steps_and_the_rest_is_the_same(tmp_path):
+    """A Ctrl-C may arrive anywhere within a step; the step is finished first."""
+    options = {"env_kwargs": {"size": 3}, "seed": 1}
     whole = train("pbcs/Maze-v0", **options)
+    script = ("import sys; from pbcs_ompl.skills import train; print('ready', flush=True); "
+              f"train('pbcs/Maze-v0', env_kwargs={{'size': 3}}, seed=1, out={str(tmp_path / 'run')!r}, "
+              "on_progress=lambda numbers: print(numbers, flush=True))")
+    child = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    while "'updates': 0" in (line := child.stdout.readline()) or "'train'" not in line:
+        assert child.poll() is None
+    child.send_signal(signal.SIGINT)
+    child.communicate(timeout=60)
+    assert (tmp_path / "run" / "checkpoint.npz").is_file()
+    assert fingerprint(resume(tmp_path / "run")) == fingerprint(whole)
+
+
+def outcome(run):
+    """The result of a training, also of one whose budget ended."""
+    try:
+        return run()
+    except TrainingStalled as stalled:
+        return stalled.result
+
+
+@pytest.mark.parametrize(("method", "budget"), [("pbcs", 10_000_000), ("pb", 20_000), ("backplay", 20_000),
+                                                ("plain", 30_000)])
+def test_an_interrupted_training_goes_on_bit_for_bit(tmp_path, method, budget):
+    options = {"env_kwargs": MAZE, "seed": 1, "method": method, "max_transitions": budget}
+    whole = outcome(lambda: train("pbcs/Maze-v0", **options))
     with pytest.raises(KeyboardInterrupt):
         train("pbcs/Maze-v0", **options, out=tmp_path / "run", on_progress=StopAfter(3))
-    for stop in (1, 7):
+    for stop in (1, 2):
         with pytest.raises(KeyboardInterrupt):
             resume(tmp_path / "run", on_progress=StopAfter(stop))
-    result = resume(tmp_path / "run")
+    result = outcome(lambda: resume(tmp_path / "run"))
     assert fingerprint(result) == fingerprint(whole)
-    assert not (tmp_path / "run" / "checkpoint.npz").exists()
+    assert (tmp_path / "run" / "checkpoint.npz").exists() == (result.stalled is not None)
 
 
 def test_a_stop_while_a_link_is_learnt_anew_goes_on_bit_for_bit(tmp_path):
@@ -156,6 +182,9 @@ def test_folders_are_never_overwritten_and_damage_is_named(tmp_path):
         train("pbcs/Maze-v0", env_kwargs=MAZE, out=tmp_path / "full")
     with pytest.raises(RunFolderError, match="nothing to resume"):
         resume(tmp_path / "absent")
+    train("pbcs/Maze-v0", env_kwargs=MAZE, out=tmp_path / "finished")
+    with pytest.raises(RunFolderError, match="has ended"):
+        resume(tmp_path / "finished")
     with pytest.raises(KeyboardInterrupt):
         train("pbcs/Maze-v0", env_kwargs=MAZE, seed=1, out=tmp_path / "run", on_progress=StopAfter(3))
     checkpoint = tmp_path / "run" / "checkpoint.npz"
