@@ -2,8 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray, ResetAnywhere
 from pbcs_ompl.skills.goals import Goal
@@ -54,7 +56,7 @@ def run_episodes(model: ResetAnywhere, act: Act, goal: Goal, starts: Array, *, e
     alive = np.arange(len(starts))
     reached = np.zeros(len(starts), dtype=bool)
     steps = np.zeros(len(starts), dtype=np.int64)
-    parts: list[tuple[Array, ...]] = []
+    parts: list[tuple[NDArray[Any], ...]] = []
     for _ in range(max_steps):
         here = states[alive]
         controls = with_random_actions(model, act(here), epsilon, rng)

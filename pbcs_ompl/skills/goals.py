@@ -9,7 +9,10 @@ from pbcs_ompl.core.contracts import Array, BoolArray, ResetAnywhere
 class Goal(Protocol):
     """A set of states, with a distance to its centre."""
 
-    radius: float
+    @property
+    def radius(self) -> float:
+        """The distance within which a state belongs to the goal."""
+        ...
 
     def distance(self, model: ResetAnywhere, states: Array) -> Array:
         """Return the distances [B] from states [B, D] to the centre of the goal."""

@@ -21,11 +21,15 @@ class Method(Protocol):
     """A training method: small steps until it is done, each of which can be the last before a stop.
 
     Attributes:
-        done: Whether the skills lead from the start state to the target.
+        learner: Who trains, and counts what it costs.
     """
 
     learner: Learner
-    done: bool
+
+    @property
+    def done(self) -> bool:
+        """Whether the skills lead from the start state to the target."""
+        ...
 
     def step(self) -> None:
         """Do one session or one test."""

@@ -73,7 +73,7 @@ def save_policies(path: Path, policies: list[SkillPolicy]) -> None:
     for index, policy in enumerate(policies):
         tensors |= {f"{index}.{name}": np.ascontiguousarray(array)
                     for name, array in policy_to_arrays(policy).items()}
-    write_atomically(path, lambda file: file.write(save(tensors)) and None)
+    write_atomically(path, lambda file: file.write(save(tensors)))
 
 
 def load_policies(path: Path, count: int) -> list[SkillPolicy]:

@@ -146,9 +146,10 @@ class Training:
                 stalled: str | None) -> TrainResult:
         seconds = time.perf_counter() - self.began
         chain = SkillChain.of(method.skills, method.learner.milestones) if method and method.skills else None
-        complete = chain is not None and stalled is None
-        nominal = evaluate(chain, self.model, episodes=1, seed=self.config.seed) if chain and complete else None
-        robust = evaluate(chain, self.model, epsilon=ROBUST_EPSILON, seed=self.config.seed) if nominal else None
+        nominal = robust = None
+        if chain is not None and stalled is None:
+            nominal = evaluate(chain, self.model, episodes=1, seed=self.config.seed)
+            robust = evaluate(chain, self.model, epsilon=ROBUST_EPSILON, seed=self.config.seed)
         result = TrainResult(
             solved=bool(nominal and robust and nominal.success_rate == 1 and robust.success_rate >= ROBUST_RATE),
             nominal=nominal, robust=robust, chain=chain, trajectory=trajectory,

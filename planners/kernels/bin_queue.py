@@ -12,13 +12,11 @@ import numpy as np
 from numba import njit, types
 from numpy.typing import NDArray
 
-from planners.kernels.runs import MEMBER, RUN, append, choose
+from planners.kernels.runs import LENGTH, LOWEST, MEMBER, SIZE, START, append, choose
 
 SMALLEST = 2  # log2 of the rows of a new bin's slice
 CLASSES = 32  # slice sizes 2**0 .. 2**31
 Number = int | np.int64  # what compiled functions return is one of them, depending on who calls
-START, LENGTH, SIZE = 0, 1, 2  # columns of `slices`
-BINS, POOL = 0, 1  # entries of `used`
 GROWTH = 4  # of the arrays; rooms cost address space only
 FARTHEST = 4.6e18  # cells beyond this coordinate are one cell: int64 ends there
 
@@ -28,10 +26,12 @@ class BinQueue(NamedTuple):
 
     pool: NDArray[np.int32]
     """Node queues of all bins [R, 3]; a free slice's first row is the next free slice of its size, or -1."""
-    slices: NDArray[np.int32]
-    """Of each bin: first row in the pool, length, log2 of the rows [M, 3]."""
+    heads: NDArray[np.int32]
+    """The head of each bin's queue [M, 4]."""
     order: NDArray[np.int32]
     """The queue of the bins [M, 3]."""
+    head: NDArray[np.int32]
+    """Its head [1, 4]; its length is the number of bins."""
     cells: NDArray[np.int64]
     """Integer coordinates of each bin [M, F]."""
     table: NDArray[np.int32]
@@ -39,20 +39,25 @@ class BinQueue(NamedTuple):
     free: NDArray[np.int32]
     """First free slice of each size, -1 for none [CLASSES]."""
     used: NDArray[np.int64]
-    """Number of bins, and of pool rows ever given away [2]."""
+    """Pool rows ever given away [1]."""
+
+    @property
+    def num_bins(self) -> int:
+        """Number of bins."""
+        return int(self.head[0, LENGTH])
 
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays; rooms that were never written to are not counted."""
-        bins, rows = int(self.used[BINS]), int(self.used[POOL])
-        return (self.pool[:rows].nbytes + self.slices[:bins].nbytes + self.order[:bins].nbytes
-                + self.cells[:bins].nbytes + self.table.nbytes + self.free.nbytes + self.used.nbytes)
+        by_bin = self.heads, self.order, self.cells
+        return (self.pool[:self.used[0]].nbytes + sum(array[:self.num_bins].nbytes for array in by_bin)
+                + self.table.nbytes + self.head.nbytes + self.free.nbytes + self.used.nbytes)
 
 
 _integers = types.int64[:, ::1]
 _entries = types.int32[:, ::1]
-QUEUE_TYPE = types.NamedTuple((_entries, _entries, _entries, _integers, types.int32[::1], types.int32[::1],
-                               types.int64[::1]), BinQueue)
+QUEUE_TYPE = types.NamedTuple((_entries, _entries, _entries, _entries, _integers, types.int32[::1],
+                               types.int32[::1], types.int64[::1]), BinQueue)
 """Numba's type of BinQueue."""
 
 
@@ -60,9 +65,11 @@ def empty_queue(num_features: int) -> BinQueue:
     """Return a queue without bins; its rooms cost no memory until they are written to."""
     rooms, rows = 1 << 14, 1 << 16
     return BinQueue(
-        pool=np.empty((rows, 3), np.int32), slices=np.empty((rooms, 3), np.int32),
-        order=np.empty((rooms, 3), np.int32), cells=np.empty((rooms, num_features), np.int64),
-        table=np.zeros(4 * rooms, np.int32), free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64))
+        pool=np.empty((rows, 3), np.int32), heads=np.empty((rooms, 4), np.int32),
+        order=np.empty((rooms, 3), np.int32), head=np.zeros((1, 4), np.int32),
+        cells=np.empty((rooms, num_features), np.int64), table=np.zeros(4 * rooms, np.int32),
+        free=np.full(CLASSES, -1, np.int32), used=np.zeros(1, np.int64))
+
 
 
 def insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_], size: NDArray[np.float64],
@@ -81,21 +88,20 @@ def insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool
 @njit(cache=True)
 def select(queue: BinQueue, uniforms: NDArray[np.float64], nodes: NDArray[np.int64]) -> None:
     """Write into `nodes` [B] as many selections in a row, by numbers uniform in [0, 1) [B, 2]: bin, node."""
-    pool, slices, order, bins = queue.pool, queue.slices, queue.order, queue.used[BINS]
+    pool, heads, order, head = queue.pool, queue.heads, queue.order, queue.head
     for i in range(len(nodes)):
-        number = choose(order, 0, bins, uniforms[i, 0])
-        nodes[i] = choose(pool, slices[number, START], slices[number, LENGTH], uniforms[i, 1])
+        nodes[i] = choose(pool, heads, choose(order, head, 0, uniforms[i, 0]), uniforms[i, 1])
 
 
 @njit(cache=True)
 def tied_bins(queue: BinQueue) -> int:
     """Return how many bins share the lowest count."""
-    bins = queue.used[BINS]
-    return bins - queue.order[bins - 1, RUN]
+    return queue.head[0, LENGTH] - queue.head[0, LOWEST]
 
 
 @njit(cache=True)
-def cell_of(features: NDArray[np.float64], row: int, size: NDArray[np.float64], cell: NDArray[np.int64]) -> None:
+def cell_of(features: NDArray[np.float64], row: int, size: NDArray[np.float64],
+            cell: NDArray[np.int64]) -> None:
     """Write the coordinates floor(feature / size) of features[row] into `cell` [F]."""
     for axis in range(len(cell)):
         cell[axis] = int(min(max(np.floor(features[row, axis] / size[axis]), -FARTHEST), FARTHEST))
@@ -120,15 +126,11 @@ def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[
 
 
 @njit(cache=True, inline="always")
-def add(pool: NDArray[np.int32], slices: NDArray[np.int32], number: int, node: int) -> bool:
+def add(pool: NDArray[np.int32], heads: NDArray[np.int32], number: int, node: int) -> bool:
     """Add a node of count 0 to a bin; return False where the bin is full, or there is none (number -1)."""
-    if number < 0:
+    if number < 0 or heads[number, LENGTH] == 1 << heads[number, SIZE]:
         return False
-    length = np.int64(slices[number, LENGTH])
-    if length == 1 << slices[number, SIZE]:
-        return False
-    append(pool, slices[number, START], length, node)
-    slices[number, LENGTH] = length + 1
+    append(pool, heads, number, node)
     return True
 
 
@@ -142,20 +144,20 @@ def make_room_and_add(queue: BinQueue, cell: NDArray[np.int64], place: int, node
             return False
     elif not _double(queue, number):
         return False
-    return add(queue.pool, queue.slices, number, node)
+    return add(queue.pool, queue.heads, number, node)
 
 
 @njit(cache=True)
 def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_],
             size: NDArray[np.float64], first: int, done: int) -> int:
     """Insert from position `done` on; return where an array was full."""
-    pool, slices, cells, table = queue.pool, queue.slices, queue.cells, queue.table
+    pool, heads, cells, table = queue.pool, queue.heads, queue.cells, queue.table
     cell = np.empty(features.shape[1], np.int64)
     while done < len(features):
         if not skip[done]:
             cell_of(features, done, size, cell)
             place = find_cell(cells, table, cell)
-            if not (add(pool, slices, table[place] - 1, first + done)
+            if not (add(pool, heads, table[place] - 1, first + done)
                     or make_room_and_add(queue, cell, place, first + done)):
                 return done
         done += 1
@@ -165,28 +167,26 @@ def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.boo
 @njit(cache=True)
 def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: int) -> Number:
     """Open a bin at a place of the hash table; return -1 if there is no room for one."""
-    number = np.int64(queue.used[BINS])
-    if number == len(queue.slices):
+    number = np.int64(queue.head[0, LENGTH])
+    if number == len(queue.heads):
         return -1
     start = _take(queue.pool, queue.free, queue.used, SMALLEST)
     if start < 0:
         return -1
-    slices, cells = queue.slices, queue.cells
+    heads, cells = queue.heads, queue.cells
+    heads[number, START], heads[number, LENGTH], heads[number, SIZE] = start, 0, SMALLEST
     for axis in range(len(cell)):
         cells[number, axis] = cell[axis]
-    slices[number, START], slices[number, LENGTH], slices[number, SIZE] = start, 0, SMALLEST
     queue.table[place] = number + 1
-    append(queue.order, 0, number, number)
-    queue.used[BINS] += 1
+    append(queue.order, queue.head, 0, number)
     return number
 
 
 @njit(cache=True)
 def _double(queue: BinQueue, number: int) -> bool:
     """Move a full bin to a slice of twice the size; return whether there was room."""
-    pool, slices, free = queue.pool, queue.slices, queue.free
-    start, length = np.int64(slices[number, START]), np.int64(slices[number, LENGTH])
-    size = np.int64(slices[number, SIZE])
+    pool, heads, free = queue.pool, queue.heads, queue.free
+    start, length, size = heads[number, START], heads[number, LENGTH], np.int64(heads[number, SIZE])
     moved = _take(pool, free, queue.used, size + 1)
     if moved < 0:
         return False
@@ -195,7 +195,7 @@ def _double(queue: BinQueue, number: int) -> bool:
             pool[moved + row, column] = pool[start + row, column]
     pool[start, MEMBER] = free[size]
     free[size] = start
-    slices[number, START], slices[number, SIZE] = moved, size + 1
+    heads[number, START], heads[number, SIZE] = moved, size + 1
     return True
 
 
@@ -206,25 +206,25 @@ def _take(pool: NDArray[np.int32], free: NDArray[np.int32], used: NDArray[np.int
     if start >= 0:
         free[size] = pool[start, MEMBER]
         return start
-    start = used[POOL]
+    start = used[0]
     if start + (1 << size) > len(pool):
         return -1
-    used[POOL] += 1 << size
+    used[0] += 1 << size
     return start
 
 
 def _grow(queue: BinQueue) -> BinQueue:
     """Return a queue with more room of each kind that is short."""
-    bins = int(queue.used[BINS])
-    if bins == len(queue.slices):
+    bins = queue.num_bins
+    if bins == len(queue.heads):
         rooms = GROWTH * bins
         table = np.zeros(4 * rooms, np.int32)
         cells = _enlarged(queue.cells, bins, rooms)
         _rehash(cells, table, bins)
-        return queue._replace(slices=_enlarged(queue.slices, bins, rooms), cells=cells, table=table,
+        return queue._replace(heads=_enlarged(queue.heads, bins, rooms), cells=cells, table=table,
                               order=_enlarged(queue.order, bins, rooms))
-    rows = int(queue.used[POOL])
-    largest = 1 << (int(queue.slices[:bins, SIZE].max(initial=SMALLEST)) + 1)
+    rows = int(queue.used[0])
+    largest = 1 << (int(queue.heads[:bins, SIZE].max(initial=SMALLEST)) + 1)
     return queue._replace(pool=_enlarged(queue.pool, rows, max(GROWTH * len(queue.pool), rows + largest)))
 
 

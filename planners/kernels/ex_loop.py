@@ -7,18 +7,9 @@ from numba import njit, types
 
 from pbcs_ompl.core.contracts import Array, IndexArray
 from planners.compiled import STEP_TYPE
-from planners.kernels.bin_queue import (
-    BINS,
-    LENGTH,
-    QUEUE_TYPE,
-    START,
-    BinQueue,
-    add,
-    cell_of,
-    find_cell,
-    make_room_and_add,
-)
-from planners.kernels.runs import choose
+from planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, make_room_and_add
+from planners.kernels.prefetch import prefetch
+from planners.kernels.runs import MEMBER, choose, peek
 from planners.tree import Columns
 
 DONE, GOAL, FULL, NOT_FINITE = range(4)
@@ -52,16 +43,21 @@ def expand(step: Any, reals: Array, table: Array, integers: IndexArray, feature_
     """
     # Fields of named tuples are counted references: in the loop they would cost more than the work.
     states, features, all_controls, parents, rewards, ends = columns
-    pool, slices, order, cells, places = queue.pool, queue.slices, queue.order, queue.cells, queue.table
+    pool, heads, order, head = queue.pool, queue.heads, queue.order, queue.head
+    cells, places = queue.cells, queue.table
     cell = np.empty(len(bin_size), np.int64)
     done = 0
     for row in range(len(uniforms)):
-        number = choose(order, 0, queue.used[BINS], uniforms[row, 0])
-        node = choose(pool, slices[number, START], slices[number, LENGTH], uniforms[row, 1])
+        node = choose(pool, heads, choose(order, head, 0, uniforms[row, 0]), uniforms[row, 1])
+        # The next choice is known already unless this child opens a bin: fetch its memory while others work.
+        following = min(row + 1, len(uniforms) - 1)
+        ahead = peek(heads, order[peek(head, 0, uniforms[following, 0]), MEMBER], uniforms[following, 1])
+        prefetch(pool, ahead)
         child = first + row
         for axis in range(len(low)):
             all_controls[child, axis] = low[axis] + (high[axis] - low[axis]) * uniforms[row, 2 + axis]
         reward, terminal, success = step(reals, table, integers, states, node, all_controls, child)
+        prefetch(states, pool[ahead, MEMBER])
         for axis in range(len(feature_dims)):
             features[child, axis] = states[child, feature_dims[axis]]
         parents[child] = node
@@ -76,6 +72,6 @@ def expand(step: Any, reals: Array, table: Array, integers: IndexArray, feature_
             continue
         cell_of(features, child, bin_size, cell)
         place = find_cell(cells, places, cell)
-        if not (add(pool, slices, places[place] - 1, child) or make_room_and_add(queue, cell, place, child)):
+        if not (add(pool, heads, places[place] - 1, child) or make_room_and_add(queue, cell, place, child)):
             return done, FULL
     return done, DONE

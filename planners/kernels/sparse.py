@@ -4,8 +4,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planners.kernels.bin_queue import BINS, LENGTH, START, BinQueue, find_cell
-from planners.kernels.runs import MEMBER
+from planners.kernels.bin_queue import BinQueue, find_cell
+from planners.kernels.runs import LENGTH, MEMBER, START
 
 
 @njit(cache=True)
@@ -19,11 +19,11 @@ def draw_sparse(queue: BinQueue, reach: int, rng: np.random.Generator, nodes: ND
     cell = np.empty(queue.cells.shape[1], np.int64)
     for row in range(len(nodes)):
         while True:
-            number = int(rng.random() * queue.used[BINS])
-            inside = queue.slices[number, LENGTH]
+            number = int(rng.random() * queue.head[0, LENGTH])
+            inside = queue.heads[number, LENGTH]
             if rng.random() * _around(queue, number, reach, cell) < inside:
                 break
-        nodes[row] = queue.pool[queue.slices[number, START] + int(rng.random() * inside), MEMBER]
+        nodes[row] = queue.pool[queue.heads[number, START] + int(rng.random() * inside), MEMBER]
 
 
 @njit(cache=True)
@@ -39,5 +39,5 @@ def _around(queue: BinQueue, number: int, reach: int, cell: NDArray[np.int64]) -
             rest //= width
         found = queue.table[find_cell(queue.cells, queue.table, cell)] - 1
         if found >= 0:
-            total += queue.slices[found, LENGTH]
+            total += queue.heads[found, LENGTH]
     return total

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.kernels.bin_queue import BINS, LENGTH, START, empty_queue, insert, select, tied_bins
-from planners.kernels.runs import COUNT, MEMBER
+from planners.kernels.bin_queue import empty_queue, insert, select, tied_bins
+from planners.kernels.runs import COUNT, LENGTH, MEMBER, START
 
 
 class Algorithm5:
@@ -50,8 +50,8 @@ class Algorithm5:
 def counts_of(queue):
     """Return {cell: (bin count, {node: count})}."""
     bins = {}
-    for member, count, _ in queue.order[:queue.used[BINS]].tolist():
-        start, length = queue.slices[member, START], queue.slices[member, LENGTH]
+    for member, count, _ in queue.order[:queue.num_bins].tolist():
+        start, length = queue.heads[member, START], queue.heads[member, LENGTH]
         rows = queue.pool[start:start + length]
         inside = dict(zip(rows[:, MEMBER].tolist(), rows[:, COUNT].tolist(), strict=True))
         bins[tuple(queue.cells[member])] = (count, inside)
@@ -133,20 +133,20 @@ def test_skipped_nodes_are_never_selected_and_open_no_bin():
     queue = insert(empty_queue(1), points, skip, np.ones(1), 0)
     nodes = np.empty(200, np.int64)
     select(queue, np.random.default_rng(6).random((200, 2)), nodes)
-    assert queue.used[BINS] == 10
+    assert queue.num_bins == 10
     assert set(nodes.tolist()) == set(range(0, 20, 2))
 
 
 def test_far_away_features_have_a_bin_too():
     queue = insert(empty_queue(1), np.array([[1e300], [-1e300], [0.0]]), np.zeros(3, bool), np.ones(1), 0)
-    assert queue.used[BINS] == 3
+    assert queue.num_bins == 3
 
 
 def test_large_trees_keep_every_node_once():
     rng = np.random.default_rng(7)
     points = rng.normal(0, 30, (300_000, 2))
     queue = insert(empty_queue(2), points, np.zeros(len(points), bool), np.ones(2), 0)
-    slices = queue.slices[:queue.used[BINS]]
-    members = [queue.pool[start:start + length, MEMBER] for start, length, _ in slices]
+    heads = queue.heads[:queue.num_bins]
+    members = [queue.pool[head[START]:head[START] + head[LENGTH], MEMBER] for head in heads]
     assert np.array_equal(np.sort(np.concatenate(members)), np.arange(len(points)))
-    assert queue.used[BINS] == len(np.unique(np.floor(points), axis=0))
+    assert queue.num_bins == len(np.unique(np.floor(points), axis=0))
