@@ -64,20 +64,22 @@ class LeastExpanded(Strategy):
 
     def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:
         """Expand up to `count` nodes one at a time in compiled code (see `planners.compiled`)."""
-        low, high = np.array(self.space.action_low), np.array(self.space.action_high)
-        uniforms = self.rng.random((count, 2 + len(low)))
+        bounds = np.array([self.space.action_low, self.space.action_high])
+        uniforms = self.rng.random((count, 2 + bounds.shape[1]))
         tree.reserve(count)
         done = 0
         while done < count:
             first = len(tree)
-            written, reason = ex_loop.expand(*step, feature_dims, low, high, tree.columns, first, self.queue,
-                                             self._size, uniforms[done:])
+            written, reason = ex_loop.expand(step.step, step[1:], feature_dims, bounds, tree.columns, first,
+                                             self.queue, self._size, uniforms[done:])
             tree.claim(written)
             done += written
-            if reason != ex_loop.DONE and reason != ex_loop.NOT_FINITE:
+            if reason == ex_loop.NOT_FINITE:
+                break
+            if reason != ex_loop.DONE:
                 self.inserted(tree, len(tree) - 1, len(tree))
-            if reason in (ex_loop.GOAL, ex_loop.NOT_FINITE):
-                return len(tree) - 1 if reason == ex_loop.GOAL else -1
+            if reason == ex_loop.GOAL:
+                return len(tree) - 1
         return -1
 
 

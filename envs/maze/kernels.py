@@ -19,6 +19,8 @@ ROUNDING = 4e-16
 """Bound of the relative error of a 2 x 2 determinant of differences: (3 + 16 u) u with u = 2**-53, rounded up
 (Shewchuk 1997, Adaptive Precision Floating-Point Arithmetic, orient2d)."""
 
+# What the step of a point runs through is inlined: a call costs as much as looking at a wall.
+
 # Places of the maze's own settings in the array `settings`, after those of `point_kernels`.
 SLIDE, CELLS = FIRST_FREE, FIRST_FREE + 1
 
@@ -61,7 +63,7 @@ def _cell(x: float, cells: float) -> int:
     return int(scaled)
 
 
-@njit(cache=True)
+@njit(inline="always", cache=True)
 def _hits_any(rectangles: Array, lists: IndexArray, begin: int, end: int,
               x0: float, y0: float, x1: float, y1: float) -> bool:
     for k in range(begin, end):
@@ -104,7 +106,7 @@ def _slide(rectangles: Array, lists: IndexArray, begin: int, end: int,
     return x, y
 
 
-@njit(cache=True)
+@njit(inline="always", cache=True)
 def _move(rectangles: Array, lists: IndexArray, settings: Array,
           x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
     """Return the next position, and whether the step hit a wall."""

@@ -16,9 +16,9 @@ from planners.kernels.runs import LENGTH, LOWEST, MEMBER, SIZE, START, append, c
 
 SMALLEST = 2  # log2 of the rows of a new bin's slice
 CLASSES = 32  # slice sizes 2**0 .. 2**31
-Number = int | np.int64  # what compiled functions return is one of them, depending on who calls
 GROWTH = 4  # of the arrays; rooms cost address space only
 FARTHEST = 4.6e18  # cells beyond this coordinate are one cell: int64 ends there
+Number = int | np.int64
 
 
 class BinQueue(NamedTuple):
@@ -69,7 +69,6 @@ def empty_queue(num_features: int) -> BinQueue:
         order=np.empty((rooms, 3), np.int32), head=np.zeros((1, 4), np.int32),
         cells=np.empty((rooms, num_features), np.int64), table=np.zeros(4 * rooms, np.int32),
         free=np.full(CLASSES, -1, np.int32), used=np.zeros(1, np.int64))
-
 
 
 def insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_], size: NDArray[np.float64],

@@ -30,19 +30,28 @@ def _finite(states: Array, row: int) -> bool:
     return total == 0.0
 
 
-@njit(types.UniTuple(types.int64, 2)(STEP_TYPE, _vector, _matrix, _integers, _integers, _vector, _vector,
-                                     COLUMNS_TYPE, types.int64, QUEUE_TYPE, _vector, _matrix), cache=True)
-def expand(step: Any, reals: Array, table: Array, integers: IndexArray, feature_dims: IndexArray,
-           low: Array, high: Array, columns: Columns, first: int, queue: BinQueue, bin_size: Array,
-           uniforms: Array) -> tuple[int, int]:
+@njit(types.UniTuple(types.int64, 2)(
+    STEP_TYPE, types.Tuple((_vector, _matrix, _integers)), _integers, _matrix, COLUMNS_TYPE, types.int64,
+    QUEUE_TYPE, _vector, _matrix), cache=True)
+def expand(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
+           columns: Columns, first: int, queue: BinQueue, bin_size: Array, uniforms: Array) -> tuple[int, int]:
     """Expand a node for each row of `uniforms` [B, 2 + A] (bin, node, control); new nodes begin at `first`.
+
+    Args:
+        step, parameters: See `planners.compiled.CompiledStep`.
+        feature_dims: Dimensions of the state that are the feature [F].
+        bounds: Lower and upper bounds of the controls [2, A].
+        columns: The tree's arrays, with room for B more nodes.
+        first: The number of nodes so far.
+        queue, bin_size: The counters, and the edges of the bins [F].
 
     Returns:
         How many nodes were written, and why the loop ended. Unless DONE, the last of them is not in the
         queue: it is the goal, or the queue was too small for it, or its state is not finite.
     """
     # Fields of named tuples are counted references: in the loop they would cost more than the work.
-    states, features, all_controls, parents, rewards, ends = columns
+    reals, table, integers = parameters
+    states, features, controls, parents, rewards, ends = columns
     pool, heads, order, head = queue.pool, queue.heads, queue.order, queue.head
     cells, places = queue.cells, queue.table
     cell = np.empty(len(bin_size), np.int64)
@@ -54,9 +63,10 @@ def expand(step: Any, reals: Array, table: Array, integers: IndexArray, feature_
         ahead = peek(heads, order[peek(head, 0, uniforms[following, 0]), MEMBER], uniforms[following, 1])
         prefetch(pool, ahead)
         child = first + row
-        for axis in range(len(low)):
-            all_controls[child, axis] = low[axis] + (high[axis] - low[axis]) * uniforms[row, 2 + axis]
-        reward, terminal, success = step(reals, table, integers, states, node, all_controls, child)
+        for axis in range(bounds.shape[1]):
+            low, high = bounds[0, axis], bounds[1, axis]
+            controls[child, axis] = low + (high - low) * uniforms[row, 2 + axis]
+        reward, terminal, success = step(reals, table, integers, states, node, controls, child)
         prefetch(states, pool[ahead, MEMBER])
         for axis in range(len(feature_dims)):
             features[child, axis] = states[child, feature_dims[axis]]
