@@ -64,6 +64,7 @@ def resume(folder: str | Path, *, max_transitions: int | None = None,
         values = read_toml(opened.path / CONFIG)
         try:
             env, env_kwargs = values.pop("env"), values.pop("env_kwargs", {})
+            values.pop("versions", None)
             config = TrainConfig(**values | ({"max_transitions": max_transitions} if max_transitions else {}))
         except (KeyError, TypeError) as error:
             raise DamagedFile(f"{opened.path / CONFIG} is not the configuration of a training: {error}") from error

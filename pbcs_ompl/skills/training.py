@@ -2,6 +2,7 @@
 
 import threading
 import time
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from pbcs_ompl.agents.update import one_thread
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.bridge.stopping import interruptible
 from pbcs_ompl.bridge.trajectory import Trajectory
+from pbcs_ompl.bridge.versions import planning_versions
 from pbcs_ompl.core.contracts import Counter, ProgressCallback, ResetAnywhere
 from pbcs_ompl.core.errors import CallbackFailed, Mismatch, PbcsError
 from pbcs_ompl.core.run_folder import RunFolder, read_json, write_json
@@ -71,7 +73,8 @@ class Training:
             self.folder.write_config({
                 "env": self.model.env_id, "method": config.method, "agent": config.agent, "preset": config.preset,
                 "seed": config.seed, "max_transitions": config.max_transitions, "env_kwargs": self.model.env_kwargs,
-                "settings": config.settings, "agent_settings": config.agent_settings})
+                "settings": config.settings, "agent_settings": config.agent_settings,
+                "versions": planning_versions() | {"torch": version("torch")}})
 
     def _plan(self, trajectory: Trajectory | None) -> tuple[Trajectory | None, int]:
         """Return the plan and the transitions it took."""
