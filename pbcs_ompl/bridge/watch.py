@@ -38,17 +38,18 @@ class Watch:
             self.error = error
 
     def raise_error(self) -> None:
-        """Raise what a callback raised, if any did.
+        """Raise what a callback raised, if any did, and forget it.
 
         Raises:
             CallbackFailed: a callback raised; the exception is chained. Our own errors are raised as such.
             KeyboardInterrupt: the user interrupted inside a callback.
         """
-        if self.error is None:
+        error, self.error = self.error, None  # kept, it would close a circle through OMPL that Python cannot see
+        if error is None:
             return
-        if isinstance(self.error, PbcsError) or not isinstance(self.error, Exception):
-            raise self.error
-        raise failure(self.error) from self.error
+        if isinstance(error, PbcsError) or not isinstance(error, Exception):
+            raise error
+        raise failure(error) from error
 
 
 def failure(error: BaseException) -> CallbackFailed:

@@ -1,5 +1,6 @@
 """Laws of plan(): true answers with their evidence, every mistake one named error, nothing half-written."""
 
+import gc
 import json
 import os
 import signal
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from itertools import pairwise
 
 import numpy as np
@@ -215,6 +217,25 @@ def test_failing_environment(square, planner, answer, tmp_path):
         plan(model, planner, out=tmp_path / "run")
     assert (caught.value.__cause__ is answer) == isinstance(answer, Exception)
     assert not (tmp_path / "run").exists()
+    if isinstance(answer, Exception):
+        answer.__traceback__ = None  # pytest keeps the parameter, which would keep OMPL's objects until the end
+
+
+@pytest.mark.parametrize("planner", ["Ex", "RRT"])
+def test_a_failed_plan_leaves_nothing_in_memory(square, planner):
+    """The error is not kept by what it keeps: OMPL would hold problem, environment and tree for ever."""
+    model = square()
+
+    def failing(state, control):
+        raise ZeroDivisionError("broken world")
+
+    model.step_one = model.transition = failing
+    alive = weakref.ref(model)
+    with pytest.raises(CallbackFailed):
+        plan(model, planner)
+    del model, failing
+    gc.collect()
+    assert alive() is None
 
 
 def test_failing_planner_and_progress(square):
