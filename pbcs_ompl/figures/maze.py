@@ -49,7 +49,8 @@ def draw_line(axes: Axes, points: Array, **style: Any) -> None:
 
 def legend_below(axes: Axes) -> None:
     """Put the legend under the picture, where it hides nothing."""
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=4, frameon=False, fontsize=9)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=4, frameon=False, fontsize=9)
 
 
 def _frame(axes: Axes, model: ResetAnywhere) -> None:

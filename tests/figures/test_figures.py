@@ -78,6 +78,14 @@ def test_large_tree_is_thinned_and_says_so():
     assert "edges drawn" in figure.axes[0].get_title()
 
 
+def test_a_tree_without_path_and_goal_needs_no_legend(walk, recwarn):
+    """An environment without a goal, and nothing found: the picture has nothing to explain."""
+    model = Room()
+    model.goal_circle = None
+    tree_figure(model, walk, np.arange(-1, 29))
+    assert not recwarn.list
+
+
 def test_tree_of_a_single_node_is_drawn(tmp_path, walk):
     assert save(tree_figure(Room(), walk[:1], np.array([-1])), tmp_path / "one.png").stat().st_size > 1000
 
