@@ -1,4 +1,4 @@
-"""Agents: DDPG, stacked over seeds. Everything that needs torch lies here or above.
+"""Agents: DDPG, TD3, SAC and two cures of DDPG, stacked over seeds. Everything that needs torch lies here or above.
 
 Raises:
     MissingDependency: at import, when torch or safetensors is not installed.
@@ -14,17 +14,34 @@ except ModuleNotFoundError as error:
         f'agents need {error.name!r}, which is not installed: pip install "pbcs-ompl[rl]"') from error
 
 from pbcs_ompl.agents.ddpg import DDPG, DDPGSettings
-from pbcs_ompl.agents.noise import epsilon_greedy
+from pbcs_ompl.agents.ddpg_argmax import DDPGArgmax, DDPGArgmaxSettings
+from pbcs_ompl.agents.ddpg_regression import DDPGRegression, DDPGRegressionSettings
+from pbcs_ompl.agents.noise import EpsilonGreedy, Gaussian, OrnsteinUhlenbeck, make_noise
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.agents.presets import preset_names
+from pbcs_ompl.agents.sac import SAC, SACSettings
+from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import NonFiniteData, StackedAgent
+from pbcs_ompl.agents.td3 import TD3, TD3Settings
 
 __all__ = [
     "DDPG",
+    "SAC",
+    "TD3",
+    "AgentSettings",
+    "DDPGArgmax",
+    "DDPGArgmaxSettings",
+    "DDPGRegression",
+    "DDPGRegressionSettings",
     "DDPGSettings",
+    "EpsilonGreedy",
+    "Gaussian",
     "NonFiniteData",
+    "OrnsteinUhlenbeck",
     "Policy",
+    "SACSettings",
     "StackedAgent",
-    "epsilon_greedy",
+    "TD3Settings",
+    "make_noise",
     "preset_names",
 ]

@@ -3,9 +3,8 @@
 Differences: losses are means over the mini-batch, not (half) sums; Adam does not see the factor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
 
 import numba
 import numpy as np
@@ -13,61 +12,17 @@ import torch
 from torch import Tensor
 
 from pbcs_ompl.agents.ddpg_kernel import Constants, Stack, update_many, update_one
-from pbcs_ompl.agents.networks import MLP
-from pbcs_ompl.agents.presets import make_settings, preset
+from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.agents.trained_network import TrainedNetwork, adam_rates
-from pbcs_ompl.agents.update import Compile
 from pbcs_ompl.core.contracts import Array
-from pbcs_ompl.core.errors import InvalidOption
 
 
 @dataclass(frozen=True)
-class DDPGSettings:
-    """Settings of DDPG; the values are those of the preset "fast".
+class DDPGSettings(AgentSettings):
+    """Settings of DDPG: those that every algorithm has."""
 
-    Attributes:
-        hidden: Widths of the hidden layers of actor and critic.
-        layer_norm: Normalise the hidden layers.
-        polyak: Share of a target network that stays in each update (1 - tau).
-        replay_capacity: Transitions of each seed that are kept.
-
-    Raises:
-        InvalidOption: a value out of its range.
-    """
-
-    hidden: tuple[int, ...] = (64, 64)
-    layer_norm: bool = False
-    actor_learning_rate: float = 1e-3
-    critic_learning_rate: float = 1e-3
-    batch_size: int = 100
-    discount: float = 0.9
-    polyak: float = 0.995
-    replay_capacity: int = 1_000_000
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "hidden", tuple(self.hidden))
-        widths = [isinstance(width, int) and width > 0 for width in self.hidden]
-        checks = {"hidden": bool(widths) and all(widths),
-                  "actor_learning_rate": self.actor_learning_rate > 0.0,
-                  "critic_learning_rate": self.critic_learning_rate > 0.0,
-                  "batch_size": self.batch_size >= 1, "replay_capacity": self.replay_capacity >= 1,
-                  "discount": 0.0 <= self.discount < 1.0, "polyak": 0.0 <= self.polyak <= 1.0}
-        wanted = {"discount": "in [0, 1)", "polyak": "in [0, 1]", "hidden": "positive whole numbers"}
-        for name, good in checks.items():
-            if not good:
-                expected = wanted.get(name, "a positive number")
-                raise InvalidOption(f"{name} is {getattr(self, name)}, expected {expected}")
-
-    @classmethod
-    def from_preset(cls, name: str, **changes: Any) -> Self:
-        """Return the settings of a preset, some of them changed.
-
-        Raises:
-            UnknownName: no such preset.
-            InvalidOption: no such setting, or a value out of its range.
-        """
-        return make_settings(cls, preset(name, "ddpg") | changes)
+    algorithm = "ddpg"
 
 
 class DDPG(StackedAgent):
@@ -80,29 +35,26 @@ class DDPG(StackedAgent):
     """
 
     settings_type = DDPGSettings
-
-    def __init__(self, observation_size: int, action_low: Any, action_high: Any, *,
-                 settings: DDPGSettings | None = None, seeds: Sequence[int] = (0,),
-                 device: str | torch.device = "cpu", compile: Compile = "auto"):
-        self.settings = settings or DDPGSettings()
-        super().__init__(observation_size, action_low, action_high, self.settings, seeds, device, compile)
+    settings: DDPGSettings
 
     def _make_networks(self, generators: Sequence[torch.Generator]) -> dict[str, TrainedNetwork]:
-        actions, hidden, norm = len(self.action_low), self.settings.hidden, self.settings.layer_norm
-        actor = MLP((self.observation_size, *hidden, actions), norm)
-        critic = MLP((self.observation_size + actions, *hidden, 1), norm)
-        self._actor = TrainedNetwork(actor, generators, self.device)
-        self._critic = TrainedNetwork(critic, generators, self.device)
+        self._actor = self._network(self.observation_size, self.action_size, generators)
+        self._critic = self._network(self.observation_size + self.action_size, 1, generators)
         return {"actor": self._actor, "critic": self._critic}
 
     def _rates(self, first: int, count: int) -> Tensor:
+        """Return [K, 2, 2], the actor's and the critic's."""
         rates = (self.settings.actor_learning_rate, self.settings.critic_learning_rate)
-        return torch.stack([adam_rates(rate, first, count, self.device) for rate in rates], dim=1)
+        numbers = range(first, first + count)
+        return torch.stack([adam_rates(rate, numbers, self.device) for rate in rates], dim=1)
 
-    def _run_updates(self, rows: Tensor, rates: Tensor) -> dict[str, np.ndarray]:
+    def _inputs(self, first: int, count: int) -> Iterable[tuple[Tensor]]:
+        return zip(self._rates(first, count).unbind(), strict=True)
+
+    def _run_updates(self, rows: Tensor, first: int) -> dict[str, np.ndarray]:
         """Make the same updates as `_update` by the kernel where there is one: four times faster."""
         if self._compile != "auto" or self.device.type != "cpu" or self.settings.layer_norm:
-            return super()._run_updates(rows, rates)
+            return super()._run_updates(rows, first)
         losses = np.empty((*rows.shape[:2], 2), dtype=np.float32)
         constants = Constants(self._half.numpy(), self._centre.numpy(), np.float32(self.settings.discount),
                               np.float32(1.0 - self.settings.polyak))
@@ -110,7 +62,7 @@ class DDPG(StackedAgent):
         threads = min(torch.get_num_threads(), before, len(self.seeds))
         numba.set_num_threads(threads)
         run = update_one if threads == 1 else update_many
-        run(rows.numpy(), rates.numpy(), _stack(self._actor, len(self.seeds)),
+        run(rows.numpy(), self._rates(first, len(rows)).numpy(), _stack(self._actor, len(self.seeds)),
             _stack(self._critic, len(self.seeds)), constants, losses)
         numba.set_num_threads(before)
         critic_loss, actor_loss = np.moveaxis(losses.astype(np.float64), 2, 0)
@@ -128,23 +80,18 @@ class DDPG(StackedAgent):
 
     def _critic_gradient(self, rows: Tensor) -> Tensor:
         """Return the mean over the batch of (Q(s, a) - y)^2 (Eq. 1.2); leave its gradient in the critic."""
-        batch, critic = self._replay.unpack(rows), self._critic
-        outputs, _ = self._actor.network.forward(self._actor.target, batch.next_observations)
-        next_actions = torch.addcmul(self._centre, outputs.tanh_(), self._half)
-        next_pairs = torch.cat((batch.next_observations, next_actions), dim=2)
-        next_values, _ = critic.network.forward(critic.target, next_pairs)
+        batch = self._replay.unpack(rows)
+        unit = self._actor.target_values(batch.next_observations).tanh_()
+        next_values = self._critic.target_values(torch.cat((batch.next_observations, self._on_box(unit)), dim=2))
         targets = torch.addcmul(batch.rewards, batch.continues, next_values, value=self.settings.discount)
-        values, tape = critic.network.forward(critic.weights, batch.pairs)
-        errors = values - targets
-        critic.network.backward(critic.weights, tape, errors * (2.0 / errors.shape[1]), critic.gradient)
-        return errors.square().mean(dim=(1, 2))
+        return self._critic.regress(batch.pairs, targets)
 
     def _actor_gradient(self, rows: Tensor) -> Tensor:
         """Return the mean over the batch of -Q(s, pi(s)) (Eq. 1.3); leave its gradient in the actor."""
         batch, actor, critic = self._replay.unpack(rows), self._actor, self._critic
         outputs, actor_tape = actor.network.forward(actor.weights, batch.observations)
         unit = outputs.tanh()
-        pairs = torch.cat((batch.observations, torch.addcmul(self._centre, unit, self._half)), dim=2)
+        pairs = torch.cat((batch.observations, self._on_box(unit)), dim=2)
         values, tape = critic.network.forward(critic.weights, pairs)
         # Eq. 1.5: the critic's slope along the actions, handed down through the actor.
         slope = torch.full_like(values, -1.0 / values.shape[1])
@@ -155,10 +102,8 @@ class DDPG(StackedAgent):
 
     def value(self, observations: Array, actions: Array) -> Array:
         """Return the critics' values [S, B] of actions [S, B, A] in observations [S, B, O]."""
-        pairs = torch.cat((self._tensor(observations), self._tensor(actions)), dim=2)
         with torch.inference_mode():
-            values, _ = self._critic.network.forward(self._critic.weights, pairs)
-            return values.squeeze(2).double().cpu().numpy()
+            return self._critic.values(self._pairs(observations, actions)).squeeze(2).double().cpu().numpy()
 
 
 def _stack(network: TrainedNetwork, seeds: int) -> Stack:

@@ -1,22 +1,126 @@
-"""Exploration noise: how a behaviour policy differs from the actor."""
+"""Exploration noise: how the actions that are tried differ from those of the actor, [Matheron2020] section 6.2.2.
+
+    noise = make_noise("ornstein-uhlenbeck", sigma=0.3)
+    draws = draw_all(noise, generators, (steps, copies), action_size)      # [S, T, B, n], of many steps at once
+    tried = noise.apply(agent.act(observations), draws[:, t], fresh, low, high)
+
+All random numbers of a seed come from its own generator, whatever the actions are and whatever is replaced, so that a
+stack of S seeds explores as S separate agents do.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from inspect import signature
+from typing import Any, Protocol
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array
-from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
 
-def epsilon_greedy(actions: Array, epsilon: float, low: Array, high: Array,
-                   rng: np.random.Generator) -> Array:
-    """Return actions [..., A] of which each is, with probability `epsilon`, redrawn uniformly from the box.
+class Noise(Protocol):
+    """Turns the actors' actions into those that are tried."""
 
-    The same number of random values is drawn whatever `epsilon` is and whatever is replaced.
+    def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
+        """Return the random numbers [*shape, n] that `apply` wants."""
+        ...
+
+    def apply(self, actions: Array, draws: Array, fresh: BoolArray, low: Array, high: Array) -> Array:
+        """Return the actions to be tried [S, B, A].
+
+        Args:
+            actions: The actors' [S, B, A].
+            draws: The numbers of this step [S, B, n].
+            fresh: Where an episode begins with this step [S, B].
+            low, high: The action box [A].
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class EpsilonGreedy:
+    """With probability `epsilon` a uniformly random action; "probabilistic noise" in [Matheron2020] 6.2.2."""
+
+    epsilon: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.epsilon <= 1.0:
+            raise InvalidOption(f"epsilon is {self.epsilon}, expected a probability in [0, 1]")
+
+    def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
+        """Draw whether to explore, and where to."""
+        return generator.random((*shape, 1 + action_size))
+
+    def apply(self, actions: Array, draws: Array, fresh: BoolArray, low: Array, high: Array) -> Array:
+        """Replace some of the actions."""
+        return np.where(draws[..., :1] < self.epsilon, low + draws[..., 1:] * (high - low), actions)
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """Independent normal noise of deviation `sigma`, in units of half the box; as in Spinning Up (2018)."""
+
+    sigma: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not self.sigma >= 0.0:
+            raise InvalidOption(f"sigma is {self.sigma}, expected at least 0")
+
+    def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
+        """Draw normal numbers."""
+        return generator.standard_normal((*shape, action_size))
+
+    def apply(self, actions: Array, draws: Array, fresh: BoolArray, low: Array, high: Array) -> Array:
+        """Add the noise; the sum is cut off at the box."""
+        return np.clip(actions + self.sigma * draws * (high - low) / 2.0, low, high)
+
+
+class OrnsteinUhlenbeck:
+    """Add x to the action, in units of half the box: x <- x - theta x dt + sigma sqrt(dt) N(0, 1).
+
+    x is 0 before the first step of an episode. Source: Lillicrap et al. 2015; the values are those of OpenAI Baselines
+    (2018), [Matheron2020] 6.2.2 gives none.
+    """
+
+    def __init__(self, sigma: float = 0.2, theta: float = 0.15, dt: float = 1e-2):
+        if not (sigma >= 0.0 and 0.0 <= theta * dt <= 1.0 and dt > 0.0):
+            raise InvalidOption(f"sigma={sigma}, theta={theta}, dt={dt}: expected sigma >= 0 and theta dt in [0, 1]")
+        self.sigma, self.theta, self.dt = sigma, theta, dt
+        self._x: Array = np.zeros(1)
+
+    def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
+        """Draw normal numbers."""
+        return generator.standard_normal((*shape, action_size))
+
+    def apply(self, actions: Array, draws: Array, fresh: BoolArray, low: Array, high: Array) -> Array:
+        """Move x by one step and add it; the sum is cut off at the box."""
+        before = np.where(fresh[..., None], 0.0, self._x)
+        self._x = before * (1.0 - self.theta * self.dt) + self.sigma * np.sqrt(self.dt) * draws
+        return np.clip(actions + self._x * (high - low) / 2.0, low, high)
+
+
+NOISES: dict[str, Callable[..., Noise]] = {
+    "epsilon-greedy": EpsilonGreedy, "gaussian": Gaussian, "ornstein-uhlenbeck": OrnsteinUhlenbeck}
+
+
+def make_noise(name: str, **options: Any) -> Noise:
+    """Return the noise called `name`.
 
     Raises:
-        InvalidOption: `epsilon` is not a probability.
+        UnknownName: no such noise.
+        InvalidOption: no such option of this noise, or a value out of its range.
     """
-    if not 0.0 <= epsilon <= 1.0:
-        raise InvalidOption(f"epsilon is {epsilon}, expected a probability in [0, 1]")
-    explore = rng.random(actions.shape[:-1]) < epsilon
-    uniform = low + rng.random(actions.shape) * (high - low)
-    return np.where(explore[..., None], uniform, actions)
+    if name not in NOISES:
+        raise UnknownName("noise", name, NOISES)
+    known = signature(NOISES[name]).parameters
+    for option in options:
+        if option not in known:
+            raise InvalidOption(f"unknown option {option!r} of {name} noise{did_you_mean(option, known)}")
+    return NOISES[name](**options)
+
+
+def draw_all(noise: Noise, generators: Sequence[np.random.Generator], shape: tuple[int, ...],
+             action_size: int) -> Array:
+    """Return the draws [S, *shape, n] of all seeds, each from its own generator."""
+    return np.stack([noise.draw(generator, shape, action_size) for generator in generators])

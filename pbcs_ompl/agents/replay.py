@@ -8,8 +8,8 @@ from numba import njit
 from numpy.typing import NDArray
 from torch import Tensor
 
+from pbcs_ompl.agents.streams import hashed, stream_keys
 from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
-from pbcs_ompl.core.seeding import SeedTree
 
 FIRST_ALLOCATION = 4096
 
@@ -42,7 +42,7 @@ class Replay:
                  device: torch.device):
         self.observation_size, self.action_size, self.capacity = observation_size, action_size, capacity
         self._device = device
-        self._keys = np.array([SeedTree(seed).child("replay").integer() for seed in seeds], dtype=np.uint64)
+        self._keys = stream_keys(seeds, "replay")
         width = 2 * observation_size + action_size + 2
         self._rows = torch.zeros(len(seeds), min(FIRST_ALLOCATION, capacity), width, device=device)
         self.sizes: IndexArray = np.zeros(len(seeds), dtype=np.int64)
@@ -123,14 +123,10 @@ class Replay:
 
 @njit(cache=True)
 def _draw(keys: NDArray[np.uint64], start: int, sizes: IndexArray, stride: int, out: IndexArray) -> None:
-    """Fill `out` [K, S, B] with flat row numbers; draw n of a seed is a hash (splitmix64) of key and n."""
+    """Fill `out` [K, S, B] with flat row numbers; draw n of a seed is a function of its key and n."""
     count, seeds, batch_size = out.shape
     for k in range(count):
         for s in range(seeds):
             for b in range(batch_size):
-                position = np.uint64(start + k * batch_size + b + 1)
-                z = keys[s] * np.uint64(0xD1342543DE82EF95) + position * np.uint64(0x9E3779B97F4A7C15)
-                z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-                z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-                z = z ^ (z >> np.uint64(31))
-                out[k, s, b] = s * stride + np.int64((z >> np.uint64(11)) * 2.0**-53 * sizes[s])
+                draw = hashed(keys[s], start + k * batch_size + b + 1)
+                out[k, s, b] = s * stride + np.int64(draw * sizes[s])

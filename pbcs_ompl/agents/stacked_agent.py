@@ -1,16 +1,19 @@
 """What every algorithm shares: S agents as one stack, their replay, the training loop, saving and loading."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, Self
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents.networks import MLP
 from pbcs_ompl.agents.policy import Policy, to_box
 from pbcs_ompl.agents.replay import Replay
-from pbcs_ompl.agents.trained_network import TrainedNetwork
+from pbcs_ompl.agents.settings import AgentSettings
+from pbcs_ompl.agents.streams import stream_keys
+from pbcs_ompl.agents.trained_network import TrainedNetwork, adam_rates
 from pbcs_ompl.agents.update import Compile, choose_device, compiled, quick_arithmetic
 from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption, Mismatch, PbcsError, UnsupportedSpace
@@ -24,25 +27,15 @@ class NonFiniteData(PbcsError):
     """A NaN or an infinity in a transition or in a loss."""
 
 
-class SharedSettings(Protocol):
-    """The settings that every algorithm has."""
-
-    @property
-    def batch_size(self) -> int: ...
-    @property
-    def replay_capacity(self) -> int: ...
-    @property
-    def hidden(self) -> tuple[int, ...]: ...
-
-
 class StackedAgent(ABC):
     """S independent agents of one algorithm, trained together; axis S comes first everywhere.
 
     An algorithm is a subclass that says which networks there are, how one update is made, and what its critic
-    thinks. The network called "actor" gives the actions: its outputs, through a tanh, mapped onto the box.
+    thinks. The network called "actor" gives the actions: its first A outputs, through a tanh, mapped onto the box.
 
     Args:
         action_low, action_high: The action box [A], finite.
+        settings: An instance of `settings_type`; None for its defaults.
         seeds: One for each agent; a stack of S seeds does what S separate agents do.
         device: "cpu" or "cuda".
         compile: True, False, or "auto" (where it pays).
@@ -52,23 +45,28 @@ class StackedAgent(ABC):
         UnsupportedSpace: an action box that is empty or not finite.
     """
 
-    def __init__(self, observation_size: int, action_low: Any, action_high: Any, settings: SharedSettings,
-                 seeds: Sequence[int], device: str | torch.device, compile: Compile):
+    settings_type: ClassVar[type[AgentSettings]]
+
+    def __init__(self, observation_size: int, action_low: Any, action_high: Any, *,
+                 settings: AgentSettings | None = None, seeds: Sequence[int] = (0,),
+                 device: str | torch.device = "cpu", compile: Compile = "auto"):
+        self.settings = settings or self.settings_type()
         self.observation_size = observation_size
         self.action_low, self.action_high = _action_box(action_low, action_high)
+        self.action_size = len(self.action_low)
         self.seeds = tuple(int(seed) for seed in seeds)
         if not self.seeds or observation_size < 1:
             raise InvalidOption(f"{len(self.seeds)} seeds and {observation_size} observations, expected some")
         self.device = choose_device(device)
         self.num_updates = 0
-        self._shared = settings
         self._compile = compile
         self._half = self._tensor((self.action_high - self.action_low) / 2.0)
         self._centre = self._tensor((self.action_high + self.action_low) / 2.0)
+        self._noise_keys = stream_keys(self.seeds, "updates")
         numbers = [SeedTree(seed).child("weights").integer() for seed in self.seeds]
         self._networks = self._make_networks([torch.Generator().manual_seed(number) for number in numbers])
-        self._replay = Replay(observation_size, len(self.action_low), seeds=self.seeds,
-                              capacity=settings.replay_capacity, device=self.device)
+        self._replay = Replay(observation_size, self.action_size, seeds=self.seeds,
+                              capacity=self.settings.replay_capacity, device=self.device)
         self._run_update = compiled(self._update, compile, self.device)
 
     @abstractmethod
@@ -76,12 +74,12 @@ class StackedAgent(ABC):
         """Return the networks by name; one is called "actor"."""
 
     @abstractmethod
-    def _rates(self, first: int, count: int) -> Tensor:
-        """Return what updates number first, first + 1, ... (counted from 1) need to know, one row each."""
+    def _inputs(self, first: int, count: int) -> Iterable[tuple[Any, ...]]:
+        """Return what each of the updates number first, first + 1, ... (counted from 1) needs beside its mini-batch."""
 
     @abstractmethod
-    def _update(self, rows: Tensor, rates: Tensor) -> dict[str, Tensor]:
-        """Make one update with mini-batches `rows` [S, B, W]; return the losses [S] by name."""
+    def _update(self, *inputs: Any, **_: Any) -> dict[str, Tensor]:
+        """Make one update with mini-batches [S, B, W] and an item of `_inputs`; return the losses [S] by name."""
 
     @abstractmethod
     def value(self, observations: Array, actions: Array) -> Array:
@@ -91,8 +89,12 @@ class StackedAgent(ABC):
         """Return the actors' actions [S, B, A] for observations [S, B, O], without noise."""
         actor = self._networks["actor"]
         with torch.inference_mode():
-            outputs, _ = actor.network.forward(actor.weights, self._tensor(observations))
-            return to_box(outputs.tanh_().cpu().numpy(), self.action_low, self.action_high)
+            outputs = actor.values(self._tensor(observations))[..., : self.action_size]
+            return to_box(outputs.tanh().cpu().numpy(), self.action_low, self.action_high)
+
+    def explore(self, observations: Array) -> Array:
+        """Return the actions [S, B, A] that the agent itself would try: those of `act`, or drawn from its policy."""
+        return self.act(observations)
 
     def remember(self, observations: Array, actions: Array, rewards: Array, next_observations: Array,
                  terminals: Array | BoolArray, mask: BoolArray | None = None) -> None:
@@ -143,18 +145,18 @@ class StackedAgent(ABC):
         if num_updates > 0 and not self._replay.sizes.all():
             seed = self.seeds[int(self._replay.sizes.argmin())]
             raise InvalidOption(f"no transitions to learn from for seed {seed}; call remember first")
-        batch_size, seeds = self._shared.batch_size, len(self.seeds)
+        batch_size, seeds = self.settings.batch_size, len(self.seeds)
         chunk = max(1, CHUNK_ROWS // (batch_size * seeds))
         total: dict[str, np.ndarray] = {}
-        with quick_arithmetic(seeds * batch_size * max(self._shared.hidden) ** 2):
+        with quick_arithmetic(seeds * batch_size * max(self.settings.hidden) ** 2):
             for start in range(0, num_updates, chunk):
                 for name, losses in self._train_chunk(min(chunk, num_updates - start)).items():
                     total[name] = total.get(name, 0.0) + losses.sum(axis=0)
         return {name: losses / num_updates for name, losses in total.items()}
 
     def _train_chunk(self, count: int) -> dict[str, np.ndarray]:
-        rows = self._replay.sample(count, self._shared.batch_size)
-        losses = self._run_updates(rows, self._rates(self.num_updates + 1, count))
+        rows = self._replay.sample(count, self.settings.batch_size)
+        losses = self._run_updates(rows, self.num_updates + 1)
         for name, values in losses.items():
             if not np.isfinite(values).all():
                 update, seed = np.argwhere(~np.isfinite(values))[0]
@@ -164,9 +166,10 @@ class StackedAgent(ABC):
         self.num_updates += count
         return losses
 
-    def _run_updates(self, rows: Tensor, rates: Tensor) -> dict[str, np.ndarray]:
-        """Make an update for each of rows [K, S, B, W] and rates [K, ...]; return losses [K, S] by name."""
-        steps = [self._run_update(*inputs) for inputs in zip(rows.unbind(), rates.unbind(), strict=True)]
+    def _run_updates(self, rows: Tensor, first: int) -> dict[str, np.ndarray]:
+        """Make updates number first, first + 1, ... with rows [K, S, B, W]; return losses [K, S] by name."""
+        inputs = self._inputs(first, len(rows))
+        steps = [self._run_update(batch, *more) for batch, more in zip(rows.unbind(), inputs, strict=True)]
         return {name: torch.stack([step[name] for step in steps]).double().cpu().numpy() for name in steps[0]}
 
     def policy(self, seed_index: int = 0) -> Policy:
@@ -176,6 +179,8 @@ class StackedAgent(ABC):
         for weight, bias, norm in actor.network.split(actor.weights.flat.cpu().clone()):
             vectors = [part[seed_index, 0] for part in (bias, *(norm or ()))]
             layers.append(tuple(part.numpy().copy() for part in (weight[seed_index], *vectors)))
+        actions = self.action_size
+        layers[-1] = tuple(np.ascontiguousarray(part[..., :actions]) for part in layers[-1])
         return Policy(tuple(layers), self.action_low.copy(), self.action_high.copy())
 
     def state_dict(self) -> dict[str, np.ndarray]:
@@ -207,7 +212,7 @@ class StackedAgent(ABC):
 
     def clone(self) -> Self:
         """Return an independent copy that goes on as this one would."""
-        copy = type(self)(self.observation_size, self.action_low, self.action_high, settings=self._shared,
+        copy = type(self)(self.observation_size, self.action_low, self.action_high, settings=self.settings,
                           seeds=self.seeds, device=self.device, compile=self._compile)
         copy.load_state_dict(self.state_dict())
         return copy
@@ -216,8 +221,23 @@ class StackedAgent(ABC):
         return {f"{name}/{part}": tensor for name, network in self._networks.items()
                 for part, tensor in network.tensors().items()}
 
+    def _network(self, inputs: int, outputs: int, generators: Sequence[torch.Generator]) -> TrainedNetwork:
+        network = MLP((inputs, *self.settings.hidden, outputs), self.settings.layer_norm)
+        return TrainedNetwork(network, generators, self.device)
+
+    def _adam_rates(self, learning_rate: float, numbers: Iterable[int]) -> tuple[Tensor, ...]:
+        return adam_rates(learning_rate, numbers, self.device).unbind()
+
+    def _on_box(self, unit: Tensor) -> Tensor:
+        """Map values in [-1, 1] onto the action box."""
+        return torch.addcmul(self._centre, unit, self._half)
+
     def _tensor(self, values: Array) -> Tensor:
         return torch.from_numpy(np.asarray(values, dtype=np.float32)).to(self.device)
+
+    def _pairs(self, observations: Array, actions: Array) -> Tensor:
+        """Return what a critic is given, [S, B, O + A]."""
+        return torch.cat((self._tensor(observations), self._tensor(actions)), dim=2)
 
 
 def _action_box(low: Any, high: Any) -> tuple[Array, Array]:

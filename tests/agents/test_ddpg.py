@@ -1,4 +1,4 @@
-"""DDPG: its losses by hand, stacks against separate agents, every way of running it, saving, and learning."""
+"""DDPG: its losses by hand, every way of running it, saving, and learning; see tests/contracts/ for the rest."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import torch
 
 from pbcs_ompl.agents import DDPG, DDPGSettings, NonFiniteData
 from pbcs_ompl.agents.update import Compile
-from pbcs_ompl.core.errors import InvalidOption, Mismatch
 
 SMALL = DDPGSettings(hidden=(24, 20), batch_size=32)
 LOW, HIGH = [-1.0, 0.0], [0.5, 10.0]
@@ -96,18 +95,6 @@ def test_first_gradients_equal_autograd() -> None:
         torch.testing.assert_close(nets[name].gradient.flat, expected, rtol=1e-4, atol=1e-6)
 
 
-@pytest.mark.parametrize("layer_norm", [False, True])
-def test_a_stack_equals_separate_agents(layer_norm: bool) -> None:
-    settings = DDPGSettings(hidden=(24, 20), batch_size=32, layer_norm=layer_norm)
-    stack = fill(make(5, 6, 7, settings=settings), 0, 1, 2)
-    losses = stack.train(200)
-    for index, seed in enumerate((5, 6, 7)):
-        alone = fill(make(seed, settings=settings), index)
-        own = alone.train(200)
-        np.testing.assert_allclose(weights(stack, index), weights(alone, 0), atol=1e-5)
-        np.testing.assert_allclose(losses["critic_loss"][index], own["critic_loss"][0], rtol=1e-4)
-
-
 @pytest.mark.parametrize("compile", ["auto", False])
 def test_changing_one_seed_leaves_the_others_bit_equal(compile: Compile) -> None:
     first = fill(make(5, 6, 7, compile=compile), 0, 1, 2)
@@ -169,25 +156,6 @@ def test_saved_and_loaded_agents_go_on_bit_for_bit(compile: Compile) -> None:
     assert first.num_updates == 57
 
 
-def test_updates_do_not_depend_on_how_many_are_asked_for_at_once() -> None:
-    first, second = fill(make(1), 3), fill(make(1), 3)
-    first.train(40)
-    for count in (1, 9, 30):
-        second.train(count)
-    assert np.array_equal(weights(first, 0), weights(second, 0))
-
-
-def test_a_state_of_another_agent_is_refused() -> None:
-    agent = fill(make(1), 3)
-    state = agent.state_dict()
-    with pytest.raises(Mismatch, match="seeds"):
-        make(2).load_state_dict(state)
-    with pytest.raises(Mismatch, match="other settings"):
-        make(1, settings=DDPGSettings(hidden=(8,))).load_state_dict(state)
-    with pytest.raises(Mismatch, match="missing"):
-        make(1).load_state_dict({name: state[name] for name in state if name != "critic/mean"})
-
-
 def test_actions_stay_in_an_asymmetric_box_and_reach_its_corners() -> None:
     agent = make(1, 2)
     actor = agent._networks["actor"]
@@ -202,22 +170,6 @@ def test_actions_stay_in_an_asymmetric_box_and_reach_its_corners() -> None:
         assert ((alone >= LOW) & (alone <= HIGH)).all()
 
 
-def test_bad_transitions_are_refused_and_nothing_is_kept() -> None:
-    agent = make(1)
-    observations, actions, rewards, following, terminals = (field[None] for field in data(0, 10))
-    with pytest.raises(InvalidOption, match=r"actions have the shape \(1, 10, 1\), expected \(1, 10, 2\)"):
-        agent.remember(observations, actions[..., :1], rewards, following, terminals)
-    rewards[0, 3] = np.nan
-    with pytest.raises(NonFiniteData, match="rewards"):
-        agent.remember(observations, actions, rewards, following, terminals)
-    mask = np.isfinite(rewards)
-    agent.remember(observations, actions, rewards, following, terminals, mask)
-    assert agent.replay_sizes.tolist() == [9]
-    agent.forget()
-    with pytest.raises(InvalidOption, match="no transitions"):
-        agent.train(1)
-
-
 @pytest.mark.parametrize("compile", ["auto", False])
 def test_a_nan_in_a_loss_names_seed_and_update(compile: Compile) -> None:
     agent = fill(make(8, 9, compile=compile), 0, 1)
@@ -225,19 +177,6 @@ def test_a_nan_in_a_loss_names_seed_and_update(compile: Compile) -> None:
     agent._networks["critic"].weights.layers[0].weight[1, 0, 0] = float("nan")
     with pytest.raises(NonFiniteData, match="critic_loss of seed 9 is nan in update 4"):
         agent.train(10)
-
-
-def test_it_solves_a_bandit_and_values_it() -> None:
-    """One step, reward -(a - 0.3)^2: the actor must find 0.3, the critic the rewards."""
-    agent = DDPG(1, [-1.0], [1.0], settings=DDPGSettings(hidden=(32, 32)), seeds=(0, 1, 2))
-    actions = np.random.default_rng(0).uniform(-1, 1, (3, 2000, 1))
-    zeros = np.zeros((3, 2000, 1))
-    agent.remember(zeros, actions, -np.square(actions[..., 0] - 0.3), zeros, np.ones((3, 2000)))
-    agent.train(2000)
-    np.testing.assert_allclose(agent.act(np.zeros((3, 1, 1))), 0.3, atol=0.1)
-    probe = np.linspace(-0.9, 0.9, 7)[None, :, None].repeat(3, axis=0)
-    values = agent.value(np.zeros((3, 7, 1)), probe)
-    np.testing.assert_allclose(values, -np.square(probe[..., 0] - 0.3), atol=0.1)
 
 
 def test_it_learns_to_reach_a_point_on_a_line() -> None:

@@ -73,7 +73,7 @@ def test_adam_and_target_equal_torch_optim(way: str) -> None:
     net = TrainedNetwork(MLP((2, 9, 1)), generators(4, 5), CPU)
     leaf = net.weights.flat.clone().requires_grad_()
     target, optimiser = leaf.detach().clone(), torch.optim.Adam([leaf], lr=3e-3)
-    rates = adam_rates(3e-3, 1, 50, CPU)
+    rates = adam_rates(3e-3, range(1, 51), CPU)
     for step in range(50):
         net.gradient.flat.normal_()
         leaf.grad = net.gradient.flat.clone()

@@ -1,9 +1,10 @@
-"""Time one gradient step of DDPG, ours against stable-baselines3's, in one run.
+"""Time one gradient step of DDPG, TD3 and SAC, ours against stable-baselines3's, in one run.
 
     python tests/benchmarks/gradient_step.py [--update auto|eager|compiled] [--rounds 9]
 
-Both update actor, critic and targets from a full replay buffer with the same networks, mini-batches of 100,
-and learning rates. Ratios of medians are what counts; rounds alternate, so that both see the same noise.
+Both update actor, critics and targets from a full replay buffer with the same networks, mini-batches of 100,
+and learning rates; both train SAC's temperature. Ratios of medians are what counts; rounds alternate, so that both see
+the same noise.
 """
 
 import argparse
@@ -14,16 +15,17 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import stable_baselines3
 import torch
-from stable_baselines3 import DDPG as TheirDDPG
 from stable_baselines3.common.logger import configure
 
-from pbcs_ompl.agents import DDPG, DDPGSettings
+from pbcs_ompl.agents import DDPG, SAC, TD3, StackedAgent
 from pbcs_ompl.agents.update import Compile
 
 OBSERVATIONS, ACTIONS, FILL, BATCH = 2, 2, 20_000, 100
 COMPILE: dict[str, Compile] = {"auto": "auto", "eager": False, "compiled": True}
 BARS = {(64, 64): 6.0, (256, 256): 2.0, (400, 300): 2.0}
+ALGORITHMS: dict[str, type[StackedAgent]] = {"DDPG": DDPG, "TD3": TD3, "SAC": SAC}
 
 
 class Plane(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -43,16 +45,18 @@ def transitions(count: int) -> tuple[np.ndarray, ...]:
             rng.random(count) < 0.05)
 
 
-def ours(hidden: tuple[int, ...], seeds: int, compile: Compile) -> Callable[[int], object]:
-    agent = DDPG(OBSERVATIONS, [-1.0] * ACTIONS, [1.0] * ACTIONS, settings=DDPGSettings(hidden=hidden),
+def ours(name: str, hidden: tuple[int, ...], seeds: int, compile: Compile) -> Callable[[int], object]:
+    kind = ALGORITHMS[name]
+    agent = kind(OBSERVATIONS, [-1.0] * ACTIONS, [1.0] * ACTIONS, settings=kind.settings_type(hidden=hidden),
                  seeds=range(seeds), compile=compile)
     agent.remember(*(np.stack([field] * seeds) for field in transitions(FILL)))
     return agent.train
 
 
-def theirs(hidden: tuple[int, ...]) -> Callable[[int], object]:
-    model = TheirDDPG("MlpPolicy", Plane(), policy_kwargs={"net_arch": list(hidden)}, batch_size=BATCH,
-                      gamma=0.9, learning_rate=1e-3, tau=0.005, buffer_size=FILL, device="cpu", seed=0)
+def theirs(name: str, hidden: tuple[int, ...]) -> Callable[[int], object]:
+    kind = getattr(stable_baselines3, name)
+    model = kind("MlpPolicy", Plane(), policy_kwargs={"net_arch": list(hidden)}, batch_size=BATCH,
+                 gamma=0.9, learning_rate=1e-3, tau=0.005, buffer_size=FILL, device="cpu", seed=0)
     model.set_logger(configure(format_strings=[]))
     for observation, action, reward, following, terminal in zip(*transitions(FILL), strict=True):
         model.replay_buffer.add(observation, following, action, reward, terminal, [{}])
@@ -78,14 +82,17 @@ def main() -> None:
     options = parser.parse_args()
     for hidden, bar in BARS.items():
         count = 200 if max(hidden) <= 64 else 40
-        rows = [(ours(hidden, 1, COMPILE[options.update]), count, 1), (theirs(hidden), count, 1)]
+        rows = [(ours("DDPG", hidden, 1, COMPILE[options.update]), count, 1), (theirs("DDPG", hidden), count, 1)]
         mine, other = microseconds(rows, options.rounds)
-        print(f"{hidden}, one thread: {mine:.0f} us, stable-baselines3 {other:.0f} us: "
+        print(f"DDPG, {hidden}, one thread: {mine:.0f} us, stable-baselines3 {other:.0f} us: "
               f"{other / mine:.1f} times faster (bar {bar:g})", flush=True)
-    rows = [(ours((64, 64), 32, COMPILE[options.update]), 20, 2), (theirs((64, 64)), 100, 1)]
-    stack, other = microseconds(rows, options.rounds)
-    print(f"(64, 64), 32 seeds, two threads: {stack / 32:.0f} us a seed, stable-baselines3, one thread, "
-          f"{other:.0f} us: {other / stack * 32:.1f} times faster (target 8)")
+    for name in ALGORITHMS:
+        rows = [(ours(name, (64, 64), 1, COMPILE[options.update]), 40, 1),
+                (ours(name, (64, 64), 32, COMPILE[options.update]), 20, 2), (theirs(name, (64, 64)), 40, 1)]
+        mine, stack, other = microseconds(rows, options.rounds)
+        print(f"{name}, (64, 64): stable-baselines3, one thread, {other:.0f} us; one seed, one thread {mine:.0f} us: "
+              f"{other / mine:.1f} times faster; 32 seeds, two threads, {stack / 32:.0f} us a seed: "
+              f"{other / stack * 32:.1f} times faster (target 8)", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Presets, settings out of range, devices that are not there, and epsilon-greedy noise."""
+"""Presets, settings out of range, devices that are not there."""
 
 import subprocess
 import sys
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from pbcs_ompl.agents import DDPG, DDPGSettings, epsilon_greedy, preset_names
+from pbcs_ompl.agents import DDPG, DDPGSettings, preset_names
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, UnsupportedSpace
 
 
@@ -59,19 +59,3 @@ def test_a_missing_library_is_named_with_the_remedy(library: str) -> None:
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert library in answer.stdout
     assert 'pip install "pbcs-ompl[rl]"' in answer.stdout
-
-
-@pytest.mark.parametrize("epsilon", [0.0, 0.3, 1.0])
-def test_epsilon_greedy_replaces_that_share_by_uniform_actions(epsilon: float) -> None:
-    low, high = np.array([-1.0, 2.0]), np.array([0.0, 5.0])
-    actions = np.broadcast_to([-0.25, 3.0], (3, 4000, 2))
-    noisy = epsilon_greedy(actions, epsilon, low, high, np.random.default_rng(0))
-    changed = (noisy != actions).any(axis=-1)
-    assert changed.mean() == pytest.approx(epsilon, abs=0.02)
-    if epsilon:
-        np.testing.assert_allclose(noisy[changed].mean(axis=0), (low + high) / 2, atol=0.06)
-        np.testing.assert_allclose(noisy[changed].std(axis=0), (high - low) / 12**0.5, atol=0.06)
-    assert (noisy >= low).all()
-    assert (noisy <= high).all()
-    with pytest.raises(InvalidOption, match="probability"):
-        epsilon_greedy(actions, 1.1, low, high, np.random.default_rng(0))
