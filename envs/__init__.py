@@ -1,6 +1,6 @@
 """The environments of the thesis, registered with Gymnasium as `pbcs/...` when this package is imported.
 
-Importing is light: the entry points are strings, so that numba and FCL are loaded by `gymnasium.make` only.
+Importing is light: the entry points are strings, so that numba, FCL and MuJoCo are loaded by `gymnasium.make` only.
 """
 
 import gymnasium
@@ -9,8 +9,14 @@ ENTRY_POINTS = {
     "pbcs/Maze-v0": "envs.maze.maze:MazeEnv",
     "pbcs/Box-v0": "envs.box_disc:BoxEnv",
     "pbcs/Disc-v0": "envs.box_disc:DiscEnv",
+    "pbcs/Toy1D-v0": "envs.toy_1d:Toy1DEnv",
+    "pbcs/Drift-v0": "envs.drift:DriftEnv",
+    "pbcs/AntMaze-v0": "envs.ant_maze:AntMazeEnv",
+    "pbcs/SparseHalfCheetah-v0": "envs.sparse_half_cheetah:SparseHalfCheetahEnv",
 }
+
+EPISODE_STEPS = {"pbcs/Toy1D-v0": 50, "pbcs/Drift-v0": 50}
 
 for _env_id, _entry_point in ENTRY_POINTS.items():
     if _env_id not in gymnasium.registry:
-        gymnasium.register(_env_id, entry_point=_entry_point, max_episode_steps=1000)
+        gymnasium.register(_env_id, entry_point=_entry_point, max_episode_steps=EPISODE_STEPS.get(_env_id, 1000))

@@ -45,16 +45,24 @@ class Walkers(Strategy):
         if first == 0:
             return
         walker = 0
+        moved: dict[int, int] = {}  # the walker behind each new node
         for node, parent, terminal in zip(range(first, last), tree.parents[first:last].tolist(),
                                           tree.terminal[first:last].tolist(), strict=True):
-            while self._at[walker] != parent:
+            if parent >= first:  # the control of a new node is held on
+                mover = moved[parent]
+                moved[node] = mover
+                if self._at[mover] != parent:  # its walk was over
+                    continue
+            else:
+                while self._at[walker] != parent:
+                    walker += 1
+                mover = moved[node] = walker
                 walker += 1
-            self._steps[walker] += 1
-            over = terminal or self._steps[walker] >= self._limit
-            self._at[walker] = 0 if over else node
+            self._steps[mover] += 1
+            over = terminal or self._steps[mover] >= self._limit
+            self._at[mover] = 0 if over else node
             if over:
-                self._steps[walker] = 0
-            walker += 1
+                self._steps[mover] = 0
 
 
 class RandomWalk(StrategyPlanner):

@@ -15,7 +15,7 @@ from ompl import util as ou
 
 from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable
 from planners.grid_decomposition import grid_over
-from planners.options import check_names
+from planners.options import check_names, positive_integer
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,8 @@ class StockPlanner:
     def build(self, si: Any, *, seed: int, **options: Any) -> Any:
         """Return a new planner on an `ompl.control.SpaceInformation`.
 
+        Every planner has the option `hold`: OMPL holds each control for 1 to so many steps.
+
         Raises:
             PlannerUnavailable: the installed OMPL cannot build it.
             InvalidOption: it has no such option, at least in the installed OMPL, or refuses the value.
@@ -44,8 +46,11 @@ class StockPlanner:
         if kind is None:
             raise PlannerUnavailable(f"the installed OMPL {version('ompl')} has no {self.name} in Python")
         offered = {option: setter for option, (setter, _) in self.options.items() if hasattr(kind, setter)}
-        check_names(self.name, options, offered)
+        check_names(self.name, options, [*offered, "hold"])
+        hold = positive_integer("hold", options.get("hold", 1))
         with _quiet():
+            if hold > 1:
+                si.setMinMaxControlDuration(1, hold)
             ou.RNG.setSeed(max(1, seed))
             planner = self._construct(kind, si)
             for option, setter in offered.items():

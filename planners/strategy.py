@@ -70,7 +70,7 @@ class Strategy(ABC):
         """Learn of the new nodes first, ..., last - 1; some of them may be terminal."""
 
     @classmethod
-    def build(cls, si: Any, *, seed: int, batch: int | str = "grow", **options: Any) -> Any:
+    def build(cls, si: Any, *, seed: int, batch: int | str = "grow", hold: int = 1, **options: Any) -> Any:
         """Return an OMPL planner with this strategy on an `ompl.control.SpaceInformation`.
 
         Raises:
@@ -78,7 +78,8 @@ class Strategy(ABC):
         """
         from planners.tree_planner import TreePlanner  # it imports this module
 
-        return TreePlanner(si, cls.__name__, cls.from_options(options, cls.__name__), seed=seed, batch=batch)
+        strategy = cls.from_options(options, cls.__name__)
+        return TreePlanner(si, cls.__name__, strategy, seed=seed, batch=batch, hold=hold)
 
     @classmethod
     def from_options(cls, options: dict[str, Any], planner: str) -> Self:

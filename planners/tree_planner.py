@@ -38,17 +38,21 @@ class TreePlanner(ob.Planner):
         strategy: Which nodes to expand. It belongs to this planner.
         seed: Equal seeds give equal trees.
         batch: How many nodes are selected before any of them is expanded; "grow" leaves it to the strategy.
+        hold: Each control is held for 1 to so many steps, all lengths equally likely; every step is a node.
+            [Matheron2020] holds none (1). Steps are then not made in compiled loops.
 
     Raises:
-        InvalidOption: `batch` is neither "grow" nor a positive integer.
+        InvalidOption: `batch` is neither "grow" nor a positive integer, or `hold` is none.
     """
 
-    def __init__(self, si: Any, name: str, strategy: Strategy, *, seed: int = 0, batch: int | str = "grow"):
+    def __init__(self, si: Any, name: str, strategy: Strategy, *, seed: int = 0, batch: int | str = "grow",
+                 hold: int = 1):
         super().__init__(si, name)
         self._batch = None if batch == "grow" else positive_integer("batch", batch)
+        self._hold = positive_integer("hold", hold)
         self._strategy = strategy
         self._compiled: CompiledStrategy | None = None
-        if self._batch in (None, 1) and isinstance(strategy, CompiledStrategy):
+        if self._batch in (None, 1) and self._hold == 1 and isinstance(strategy, CompiledStrategy):
             self._compiled = strategy
         self._seeds = SeedTree(seed)
         self._rng = self._seeds.child("strategy").generator()
@@ -167,9 +171,27 @@ class TreePlanner(ob.Planner):
         nodes = _checked_nodes(strategy, tree, strategy.select(tree, min(count, left)), min(count, left))
         controls = _checked_controls(strategy, strategy.controls(tree, nodes), len(nodes))
         reached = door.expand(tree, nodes, controls, goal)
+        if reached < 0 and self._hold > 1:
+            reached = self._hold_controls(door, tree, goal, first)
         if len(tree) > first:
             strategy.inserted(tree, first, len(tree))
         return reached
+
+    def _hold_controls(self, door: Door, tree: Tree, goal: Any, first: int) -> int:
+        """Apply the controls of the nodes from `first` on again, for as long as each is held; return as above."""
+        nodes = np.arange(first, len(tree))
+        steps = self._rng.integers(0, self._hold, len(nodes))
+        for step in range(self._hold - 1):
+            going = np.flatnonzero((steps > step) & ~tree.terminal[nodes])[:door.counter.left]
+            if not len(going):
+                break
+            nodes, steps, before = nodes[going], steps[going], len(tree)
+            reached = door.expand(tree, nodes, tree.controls[nodes], goal)
+            if reached >= 0:
+                return reached
+            grown = np.arange(before, len(tree))  # fewer than `nodes` where a motion was not valid
+            nodes, steps = grown, steps[np.searchsorted(nodes, tree.parents[grown])]
+        return -1
 
 
 class StrategyPlanner(TreePlanner):
@@ -181,10 +203,10 @@ class StrategyPlanner(TreePlanner):
 
     strategy_class: ClassVar[type[Strategy]]
 
-    def __init__(self, si: Any, *, seed: int = 0, batch: int | str = "grow", **options: Any):
+    def __init__(self, si: Any, *, seed: int = 0, batch: int | str = "grow", hold: int = 1, **options: Any):
         name = type(self).__name__
         strategy = self.strategy_class.from_options(options, name)
-        super().__init__(si, name, strategy, seed=seed, batch=batch)
+        super().__init__(si, name, strategy, seed=seed, batch=batch, hold=hold)
 
     @classmethod
     def build(cls, si: Any, *, seed: int, **options: Any) -> Self:

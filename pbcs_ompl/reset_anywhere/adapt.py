@@ -1,14 +1,20 @@
 """Choose the adapter for an environment."""
 
+import warnings
 from typing import Any, cast
 
 import gymnasium
 
 from pbcs_ompl.core.contracts import ResetAnywhere, VectorisedEnv
-from pbcs_ompl.core.errors import NoResetAnywhere
+from pbcs_ompl.core.errors import InvalidOption, NoResetAnywhere
 from pbcs_ompl.reset_anywhere.get_set_state import GetSetStateModel, offers_get_set_state
-from pbcs_ompl.reset_anywhere.spaces import check_spaces
+from pbcs_ompl.reset_anywhere.mujoco_state import MujocoEnv, MujocoModel, check_observes, shows_mujoco
+from pbcs_ompl.reset_anywhere.native_state import AttributeEnv, VectorEnv, keeps_state
+from pbcs_ompl.reset_anywhere.restorable import RestorableEnv
+from pbcs_ompl.reset_anywhere.rules import FeatureRule, GoalRule
+from pbcs_ompl.reset_anywhere.spaces import check_actions, check_flattenable, check_observations
 from pbcs_ompl.reset_anywhere.vectorised import VectorisedModel
+from pbcs_ompl.reset_anywhere.visited import CopiedEnv, ReplayedEnv, check_replays, copies_are_faithful
 from pbcs_ompl.reset_anywhere.wrappers import unwrap
 
 HOW_TO = (
@@ -18,24 +24,63 @@ HOW_TO = (
 MODEL_MEMBERS = {*ResetAnywhere.__annotations__, *(n for n in vars(ResetAnywhere) if not n.startswith("_"))}
 
 
-def adapt(env: Any) -> ResetAnywhere:
+def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None) -> ResetAnywhere:
     """Return `env` as a `ResetAnywhere`; a model that is already adapted is returned as it is.
 
+    The first that fits: its own `VectorisedEnv` protocol, its own `get_env_state` and `set_env_state`, MuJoCo,
+    classic control, deep copies if they prove faithful, and replayed actions, of whose slowness a warning tells.
     The model works on `env.unwrapped` and moves it about: give it an environment of its own.
+
+    Args:
+        env: A `gymnasium.Env`.
+        goal: What a success is, in place of what the environment reports (see `rules.goal_rule`).
+        feature: What planners explore, in place of the adapter's choice (see `rules.feature_rule`).
 
     Raises:
         NoResetAnywhere: its states cannot be restored, or a wrapper would be lost; says what to implement.
         UnsupportedSpace: its actions are no finite vector Box, or its observations no vector Box.
+        InvalidOption: a rule does not parse, or does not fit the environment.
     """
     if not isinstance(env, gymnasium.Env):
+        if goal is not None or feature is not None:
+            raise InvalidOption("a goal or feature can be given to a gymnasium.Env only, not to its adapted model")
         return _as_model(env)
     inner = unwrap(env)
-    check_spaces(inner)
-    if isinstance(inner, VectorisedEnv):
+    if isinstance(inner, RestorableEnv):
+        return _model_of(inner)
+    check_actions(inner)
+    ruled = goal is not None or feature is not None
+    if isinstance(inner, VectorisedEnv) and not ruled:
+        check_observations(inner)
         return VectorisedModel(inner)
-    if offers_get_set_state(inner):
-        return GetSetStateModel(inner)
-    raise NoResetAnywhere(f"{_name(inner)} cannot be reset anywhere: {HOW_TO}")
+    if offers_get_set_state(inner) and not (shows_mujoco(inner) and not _is_vector(inner)):
+        check_observations(inner)
+        return GetSetStateModel(VectorEnv(inner, goal, feature) if ruled else inner)
+    check_flattenable(inner)
+    return _model_of(_restorable(inner, goal, feature))
+
+
+def _restorable(inner: Any, goal: Any, feature: Any) -> RestorableEnv:
+    if shows_mujoco(inner):
+        check_observes(inner)
+        return MujocoEnv(inner, goal, feature)
+    if keeps_state(inner):
+        return AttributeEnv(inner, goal, feature)
+    check_replays(inner)
+    if copies_are_faithful(inner):
+        return CopiedEnv(inner, goal, feature)
+    warnings.warn(f"{_name(inner)} is restored by replaying its actions, which is slow: {HOW_TO}", stacklevel=3)
+    return ReplayedEnv(inner, goal, feature)
+
+
+def _model_of(env: RestorableEnv) -> ResetAnywhere:
+    return MujocoModel(env) if isinstance(env, MujocoEnv) else GetSetStateModel(env)
+
+
+def _is_vector(env: Any) -> bool:
+    """Tell whether `get_env_state` returns numbers; Adroit's returns a dictionary, and lacks the warm start."""
+    env.reset(seed=0)
+    return not isinstance(env.get_env_state(), dict)
 
 
 def _as_model(model: Any) -> ResetAnywhere:

@@ -11,6 +11,7 @@ import numpy as np
 from pbcs_ompl.core.contracts import Array
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.reset_anywhere.adapt import adapt
+from pbcs_ompl.reset_anywhere.restorable import RestorableEnv
 
 STEPS = 30
 
@@ -144,11 +145,18 @@ class _Trial:
     def elsewhere(self) -> str:
         if self.env.spec is None:
             return self.first.difference(self.roll(deepcopy(self.env), self.start))
-        other = gymnasium.make(self.env.spec).unwrapped
+        other = self._second()
         other.reset(seed=54321)
         found = self.first.difference(self.roll(other, self.start))
         other.close()
         return found
+
+    def _second(self) -> Any:
+        fresh: Any = gymnasium.make(self.env.spec).unwrapped
+        if not isinstance(self.env, RestorableEnv):
+            return fresh
+        again: Any = adapt(fresh, goal=self.env.goal_rule, feature=self.env.feature_rule)
+        return again.env
 
     def copies(self) -> str:
         self.env.set_env_state(state := self.start.copy())

@@ -10,6 +10,9 @@ from pbcs_ompl.core.contracts import Array, BoolArray, Capability, Transition
 from pbcs_ompl.core.errors import InvalidOption, InvalidState, NoResetAnywhere
 from pbcs_ompl.reset_anywhere.model import Model
 
+Step = tuple[Array, float, bool, bool]
+"""Next state [D], reward, terminated, and what the step itself said about success."""
+
 
 def offers_get_set_state(env: gymnasium.Env[Any, Any]) -> bool:
     """Tell whether `env` has both methods."""
@@ -25,6 +28,7 @@ class GetSetStateModel(Model):
       bounds of the observation space serve, if the state is the observation.
     * `observe(states)`: needed unless the state is the observation.
     * `is_valid(states)`: by default whatever is within the bounds.
+    * `capabilities`, if they are not those that the bounds suggest.
     * `goal_distance(states)` and `goal_threshold`. Without them a success is what `info["is_success"]` or
       `info["success"]` says, else `terminated`; the distance to the goal is then 0 for the states in which a
       step of this model succeeded, and 1 for all others.
@@ -43,7 +47,8 @@ class GetSetStateModel(Model):
             raise NoResetAnywhere(f"{self.env_id}: state_low has {len(self.state_low)} dimensions, "
                                   f"the state has {len(state)}")
         arbitrary: set[Capability] = {"arbitrary"} if declared else set()
-        self.capabilities: frozenset[Capability] = frozenset({"visited", "exact", *arbitrary})
+        usual: frozenset[Capability] = frozenset({"visited", "exact", *arbitrary})
+        self.capabilities: frozenset[Capability] = getattr(env, "capabilities", usual)
         self._observe: Callable[[Array], Array] | None = getattr(env, "observe", None)
         if self._observe is None and not is_observation:
             raise NoResetAnywhere(f"{self.env_id}: the observation is not the state, so implement "
@@ -71,7 +76,7 @@ class GetSetStateModel(Model):
         controls = _as_batch("controls", controls, len(self.action_low), InvalidOption)
         if len(states) != len(controls):
             raise InvalidOption(f"got {len(controls)} controls for {len(states)} states")
-        steps = [self._step(state, control) for state, control in zip(states, controls, strict=True)]
+        steps = self._steps(states, controls)
         after = np.array([step[0] for step in steps]).reshape(states.shape)
         rewards = np.array([step[1] for step in steps], dtype=np.float64)
         terminated = np.array([step[2] for step in steps], dtype=np.bool_)
@@ -99,11 +104,19 @@ class GetSetStateModel(Model):
             valid[valid] = self._is_valid(np.asarray(states, dtype=np.float64)[valid])
         return valid
 
-    def _step(self, state: Array, control: Array) -> tuple[Array, float, bool, bool]:
-        self.env.set_env_state(state.copy())
-        _, reward, terminated, _, info = self.env.step(control.astype(self.env.action_space.dtype))
-        success = info.get("is_success", info.get("success", terminated))
-        return _as_vector(self.env, self.env.get_env_state()), float(reward), bool(terminated), bool(success)
+    def _steps(self, states: Array, controls: Array) -> list[Step]:
+        return self._loop(self.env, states, controls)
+
+    @staticmethod
+    def _loop(env: Any, states: Array, controls: Array) -> list[Step]:
+        """Step `env` from one state after the other."""
+        steps, dtype = [], env.action_space.dtype
+        for state, control in zip(states, controls, strict=True):
+            env.set_env_state(state.copy())
+            _, reward, terminated, _, info = env.step(control.astype(dtype))
+            success = info.get("is_success", info.get("success", terminated))
+            steps.append((_as_vector(env, env.get_env_state()), float(reward), bool(terminated), bool(success)))
+        return steps
 
     def _successes(self, after: Array, flags: list[bool]) -> BoolArray:
         if self._goal_distance is None:

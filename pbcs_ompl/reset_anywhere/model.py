@@ -1,14 +1,18 @@
 """What the adapters have in common: identity, bounds and features of an environment."""
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.contracts import Array, BoolArray, ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption, NoResetAnywhere
 from pbcs_ompl.reset_anywhere.ball import valid_in_ball
+from pbcs_ompl.reset_anywhere.rollouts import reached_in_ball
 
 DEFAULT_EPISODE_STEPS = 1000
+GOAL_KEY, FEATURE_KEY, START_KEY = "--goal", "--feature", "--start-seed"
+"""Where `env_kwargs` keep the rules that make the same model again; see `pbcs_ompl.reset_anywhere.rules`."""
 
 
 class Model:
@@ -16,7 +20,8 @@ class Model:
 
     Reads the optional attributes of an environment: `feature_dims` (default: all dimensions), `bin_size`
     (extent / 20), `walls` (none), `goal_circle` (none), `max_episode_steps` (that of its spec, else 1000),
-    `advance_towards` (none).
+    `advance_towards` (none), `distance(states, others)` (Euclid's), and `perturb_by_rollouts` (False): whether
+    states near a state are those that short random rollouts reach, because others may be no states at all.
 
     Args:
         env: The environment without wrappers. One that was not made by `gymnasium.make` has no id; its
@@ -30,6 +35,8 @@ class Model:
         self.env_id = type(env).__qualname__ if spec is None else spec.id
         self.env_kwargs: dict[str, Any] = {} if spec is None else dict(spec.kwargs)
         self.env_kwargs.pop("render_mode", None)
+        rules = {GOAL_KEY: getattr(env, "goal_rule", None), FEATURE_KEY: getattr(env, "feature_rule", None)}
+        self.env_kwargs |= {key: rule for key, rule in rules.items() if rule is not None}
         self.state_low, self.state_high = _bounds(env, state_low, state_high)
         self.action_low = env.action_space.low.astype(np.float64)
         self.action_high = env.action_space.high.astype(np.float64)
@@ -47,23 +54,32 @@ class Model:
         self.walls = np.asarray(getattr(env, "walls", np.empty((0, 4))), dtype=np.float64)
         self.goal_circle: tuple[float, float, float] | None = getattr(env, "goal_circle", None)
         self._steer = getattr(env, "advance_towards", None)
+        self._distance: Callable[[Array, Array], Array] | None = getattr(env, "distance", None)
+        self._by_rollouts = bool(getattr(env, "perturb_by_rollouts", False))
 
     def feature(self, states: Array) -> Array:
         """Return the features [B, F] of states [B, D]: a copy of the feature dimensions."""
         return np.asarray(states)[:, self._dims]
 
     def distance(self, states: Array, others: Array) -> Array:
-        """Return the Euclidean distances [B] between states [B, D] and others [B, D] or [D]."""
+        """Return the distances [B] between states [B, D] and others [B, D] or [D]: the environment's, else Euclid's."""
+        if self._distance is not None:
+            return self._distance(states, others)
         return np.linalg.norm(np.asarray(states) - others, axis=1)
 
     def perturb(self, state: Array, radius: float, count: int, rng: np.random.Generator, *,
                 reject_invalid: bool = True) -> Array:
-        """Draw states [count, D] uniformly from the ball around `state` [D]; invalid ones are drawn again.
+        """Draw states [count, D] around `state` [D]: uniformly from the ball, or by random rollouts that stay in it.
+
+        Invalid states are drawn again; what a rollout reaches is valid.
 
         Raises:
             InvalidOption: the radius is negative or not finite.
             InvalidState: no valid state was found near `state`.
         """
+        if self._by_rollouts:
+            model = cast(ResetAnywhere, self)
+            return reached_in_ball(model, np.asarray(state, dtype=np.float64), radius, count, rng)
         return valid_in_ball(state, radius, count, rng, self.is_valid if reject_invalid else None)
 
     def is_valid(self, states: Array) -> BoolArray:

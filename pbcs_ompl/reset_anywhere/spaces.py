@@ -7,13 +7,13 @@ from gymnasium import spaces
 from pbcs_ompl.core.errors import UnsupportedSpace
 
 
-def check_spaces(env: gymnasium.Env) -> None:
-    """Refuse actions that are no finite vector Box, and observations that are no vector Box.
+def check_actions(env: gymnasium.Env) -> None:
+    """Refuse actions that are no finite vector Box.
 
     Raises:
         UnsupportedSpace: says the remedy.
     """
-    action, observation = env.action_space, env.observation_space
+    action = env.action_space
     if not isinstance(action, spaces.Box):
         raise UnsupportedSpace(f"action space {action}: expected a Box, since controls are continuous; map a "
                                f"Box to these actions inside the environment")
@@ -23,8 +23,29 @@ def check_spaces(env: gymnasium.Env) -> None:
     if not (np.isfinite(action.low).all() and np.isfinite(action.high).all()):
         raise UnsupportedSpace(f"action space {action}: expected finite bounds, since actions are sampled "
                                f"uniformly; give the Box finite low and high")
+
+
+def check_observations(env: gymnasium.Env) -> None:
+    """Refuse observations that are no vector Box.
+
+    Raises:
+        UnsupportedSpace: says the remedy.
+    """
+    observation = env.observation_space
     if isinstance(observation, spaces.Dict | spaces.Tuple):
         raise UnsupportedSpace(f"observation space {type(observation).__name__}: expected a vector Box; "
                                f"flatten it inside the environment (gymnasium.spaces.flatten)")
     if not isinstance(observation, spaces.Box) or len(observation.shape) != 1:
         raise UnsupportedSpace(f"observation space {observation}: expected a vector Box")
+
+
+def check_flattenable(env: gymnasium.Env) -> None:
+    """Refuse observations that cannot be flattened: the adapters of families do so with dictionaries of Boxes.
+
+    Raises:
+        UnsupportedSpace: says the remedy.
+    """
+    observation = env.observation_space
+    parts = observation.spaces.values() if isinstance(observation, spaces.Dict) else [observation]
+    if not all(isinstance(part, spaces.Box) for part in parts):
+        raise UnsupportedSpace(f"observation space {observation}: expected a Box, or a Dict of Boxes")

@@ -21,7 +21,7 @@ from pbcs_ompl.reset_anywhere import adapt, make
     ("pbcs/Mase-v0", "did you mean 'pbcs/Maze-v0'"),
     ("pbcs/Maze-v7", "did you mean 'pbcs/Maze-v0'"),
     ("Pendulum-v7", "did you mean 'Pendulum-v1'"),
-    ("qqqq", "choose from pbcs/Box-v0"),
+    ("qqqq", "choose from pbcs/AntMaze-v0, pbcs/Box-v0"),
     ("", "unknown environment"),
     ("not an id!", "unknown environment"),
 ])
@@ -81,16 +81,20 @@ def test_an_incomplete_model_names_what_it_lacks() -> None:
         adapt(Half())
 
 
-def test_an_environment_without_a_way_says_what_to_implement() -> None:
-    with pytest.raises(NoResetAnywhere, match=r"Pendulum-v1.*get_env_state.*set_env_state.*VectorisedEnv"):
-        make("Pendulum-v1")
-
-
 class Spaces(gymnasium.Env):
     """An environment with the given spaces and nothing else."""
 
     def __init__(self, action_space: gymnasium.Space, observation_space: gymnasium.Space):
         self.action_space, self.observation_space = action_space, observation_space
+
+
+class SpacesAndState(Spaces):
+    """The same with a state of its own."""
+
+    def get_env_state(self) -> np.ndarray:
+        return np.zeros(2)
+
+    def set_env_state(self, state: np.ndarray) -> None: ...
 
 
 BOX = spaces.Box(-1.0, 1.0, (2,))
@@ -101,14 +105,24 @@ BOX = spaces.Box(-1.0, 1.0, (2,))
     (spaces.MultiBinary(3), BOX, "expected a Box"),
     (spaces.Box(-np.inf, np.inf, (2,)), BOX, "finite bounds"),
     (spaces.Box(-1.0, 1.0, (2, 2)), BOX, "expected a vector"),
-    (BOX, spaces.Dict(position=BOX), "Dict: expected a vector Box; flatten"),
-    (BOX, spaces.Tuple([BOX]), "Tuple"),
-    (BOX, spaces.Box(0.0, 1.0, (3, 3)), "vector Box"),
-    (BOX, spaces.Discrete(3), "vector Box"),
+    (BOX, spaces.Tuple([BOX]), "Dict of Boxes"),
+    (BOX, spaces.Dict(kind=spaces.Discrete(3)), "Dict of Boxes"),
+    (BOX, spaces.Discrete(3), "Dict of Boxes"),
 ])
 def test_unsupported_spaces(action: gymnasium.Space, observation: gymnasium.Space, complaint: str) -> None:
     with pytest.raises(UnsupportedSpace, match=complaint):
         adapt(Spaces(action, observation))
+
+
+@pytest.mark.parametrize(("observation", "complaint"), [
+    (spaces.Dict(position=BOX), "Dict: expected a vector Box; flatten"),
+    (spaces.Tuple([BOX]), "Tuple"),
+    (spaces.Box(0.0, 1.0, (3, 3)), "vector Box"),
+    (spaces.Discrete(3), "vector Box"),
+])
+def test_observations_that_go_with_a_state_of_its_own(observation: gymnasium.Space, complaint: str) -> None:
+    with pytest.raises(UnsupportedSpace, match=complaint):
+        adapt(SpacesAndState(BOX, observation))
 
 
 def test_wrappers_of_limits_and_rewards_are_taken_off() -> None:

@@ -1,0 +1,30 @@
+"""Where MuJoCo renders: it decides when it is imported, so this has to be asked before."""
+
+import ctypes.util
+import os
+import sys
+
+from pbcs_ompl.core.errors import MissingDependency
+
+
+def prefer_headless_rendering() -> None:
+    """On Linux without a display, let MuJoCo render through EGL where it is installed, unless MUJOCO_GL is set.
+
+    Does nothing when MuJoCo is imported already: it has decided then.
+    """
+    if "mujoco" in sys.modules:
+        return
+    if sys.platform == "linux" and not os.environ.get("DISPLAY") and ctypes.util.find_library("EGL"):
+        os.environ.setdefault("MUJOCO_GL", "egl")
+
+
+def check_can_render() -> None:
+    """Refuse to render where MuJoCo would abort the process.
+
+    Raises:
+        MissingDependency: neither a display nor a library for rendering without one.
+    """
+    without_display = sys.platform == "linux" and not os.environ.get("DISPLAY")
+    if without_display and os.environ.get("MUJOCO_GL") not in ("egl", "osmesa"):
+        raise MissingDependency("nothing can render here: there is no display; install EGL (on Debian: apt install "
+                                "libegl1) and set MUJOCO_GL=egl before mujoco is imported")

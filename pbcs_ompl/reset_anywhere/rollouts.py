@@ -1,0 +1,47 @@
+"""Find states near a state where most vectors are no states: by short random rollouts from it."""
+
+import numpy as np
+
+from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.errors import InvalidOption, InvalidState
+
+MAX_STEPS = 5
+MAX_ROUNDS = 50
+
+
+def reached_in_ball(model: ResetAnywhere, state: Array, radius: float, count: int, rng: np.random.Generator) -> Array:
+    """Return states [count, D] that 0 to 5 random steps from `state` [D] reach within `radius`.
+
+    Source: [Matheron2020] 7.2.4 perturbs in a ball. Differs: a vector near the state of a simulator may have legs in
+    the floor; what the simulator itself reaches has not.
+
+    Raises:
+        InvalidOption: the radius is negative or not finite.
+        InvalidState: too few rollouts stay in the ball.
+    """
+    if not (np.isfinite(radius) and radius >= 0.0):
+        raise InvalidOption(f"radius={radius!r}: expected a finite number >= 0")
+    found = np.empty((0, len(state)))
+    for _ in range(MAX_ROUNDS):
+        if len(found) >= count:
+            return found[:count]
+        reached = _roll(model, np.tile(state, (count, 1)), rng)
+        found = np.concatenate([found, reached[model.distance(reached, state) <= radius]])
+    if len(found) < count:
+        raise InvalidState(f"random rollouts leave the ball of radius {radius:g} around the state; take a larger one")
+    return found[:count]
+
+
+def _roll(model: ResetAnywhere, states: Array, rng: np.random.Generator) -> Array:
+    """Return what `states` [B, D] become in 0 to MAX_STEPS random steps each; ended episodes are left out."""
+    steps = rng.integers(0, MAX_STEPS + 1, len(states))
+    ended = np.zeros(len(states), dtype=np.bool_)
+    for step in range(MAX_STEPS):
+        moving = np.flatnonzero((steps > step) & ~ended)
+        if not len(moving):
+            break
+        controls = rng.uniform(model.action_low, model.action_high, (len(moving), len(model.action_low)))
+        outcome = model.transition(states[moving], controls)
+        states[moving] = outcome.states
+        ended[moving] = outcome.terminated
+    return states[~ended]

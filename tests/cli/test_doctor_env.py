@@ -1,0 +1,47 @@
+"""What `pbcs doctor --env` and the rules on the command line say."""
+
+import json
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pbcs_ompl.cli import main
+
+
+def last_json(capsys: pytest.CaptureFixture[str]) -> dict:
+    return json.loads(capsys.readouterr().out.splitlines()[-1])
+
+
+def test_the_doctor_tells_what_an_environment_can_do(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(shlex.split("doctor --env MountainCarContinuous-v0 --json")) == 0
+    found = last_json(capsys)["environment"]
+    assert found["ok"]
+    assert found["capabilities"] == ["exact", "visited"]
+    assert found["feature"].endswith("from the observation space")
+
+
+def test_rules_go_where_the_plan_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                      capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = "plan --env Pendulum-v1 --goal 'obs[0]>0.99' --feature state --start-seed 3 --out found --json"
+    assert main(shlex.split(words)) == 0
+    captured = capsys.readouterr()
+    assert "goal      obs[0]>0.99" in captured.err
+    assert "random steps, widened" in captured.err
+    assert json.loads(captured.out.splitlines()[-1])["replay_ok"]
+    assert '"--goal" = "obs[0]>0.99"' in (tmp_path / "found/config.toml").read_text()
+    assert '"--start-seed" = 3' in (tmp_path / "found/config.toml").read_text()
+
+
+def test_a_process_without_mujoco(tmp_path: Path) -> None:
+    code = ("import sys; sys.modules['mujoco'] = None\n"
+            "from pbcs_ompl.cli import main\n"
+            "assert main(['plan', '--env', 'pbcs/AntMaze-v0']) == 3\n"
+            "assert main(['plan', '--env', 'Ant-v5']) == 3\n"
+            "assert main(['plan', '--env', 'pbcs/Maze-v0']) == 0\n")
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "pip install 'pbcs-ompl[mujoco]'" in done.stderr
