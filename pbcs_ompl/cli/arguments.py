@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 from pbcs_ompl.cli.values import choice, fraction, integer, json_object, seconds
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
-METHODS = ("pbcs", "pb", "backplay", "plain")
+METHODS = ("pbcs", "pb", "backplay", "plain", "bootstrapped", "offline")
 PRESETS = ("fast", "thesis")
 DESCRIPTION = """\
 Plan with OMPL in any environment that can be reset anywhere,
@@ -55,7 +55,7 @@ def build_parser() -> Parser:
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
-    for add in (_doctor, _plan, _train, _eval, _compare):
+    for add in (_doctor, _plan, _train, _eval, _compare, _study):
         name, purpose = add.__name__.removeprefix("_"), add.__doc__ or ""
         verb = group.add_parser(name, help=purpose, description=purpose)
         add(verb)
@@ -83,6 +83,10 @@ def parse(parser: Parser, words: Sequence[str]) -> argparse.Namespace:
     arguments, surplus = parser.parse_known_args(words)
     if surplus:
         raise InvalidOption(f"unexpected word {surplus[0]!r} (see pbcs {arguments.verb} --help)")
+    for rule in ("goal", "feature", "start_seed"):  # the model is then made again wherever its env_kwargs go
+        if vars(arguments).get(rule) is not None:
+            key = f"--{rule.replace('_', '-')}"
+            arguments.env_kwargs = {**arguments.env_kwargs, key: vars(arguments)[rule]}
     return arguments
 
 
@@ -108,6 +112,7 @@ def _plan(verb: Parser) -> None:
     _add_seed(verb)
     _add_budget(verb, 1_000_000)
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop after this much wall time")
+    verb.add_argument("--video", metavar="FILE", help="film the path that was found; .mp4 or .gif")
     _add_out(verb)
 
 
@@ -117,6 +122,7 @@ def _train(verb: Parser) -> None:
     verb.add_argument("--method", type=choice("method", METHODS), default="pbcs", metavar="NAME",
                       help=f"one of {', '.join(METHODS)} (pbcs)")
     verb.add_argument("--agent", default="ddpg", metavar="NAME", help="registered, or module:Class (ddpg)")
+    verb.add_argument("--device", default="cpu", metavar="NAME", help="where the agent learns: cpu or cuda (cpu)")
     verb.add_argument("--preset", type=choice("preset", PRESETS), default="fast", metavar="NAME",
                       help="fast: ours; thesis: the settings of [Matheron2020] (fast)")
     verb.add_argument("--path", metavar="DIR",
@@ -134,6 +140,7 @@ def _eval(verb: Parser) -> None:
     verb.add_argument("--episodes", type=integer(1), default=100, metavar="N", help="how many rollouts (100)")
     verb.add_argument("--epsilon", type=fraction, default=0.0, metavar="E",
                       help="probability of a random action in each step (0)")
+    verb.add_argument("--video", metavar="FILE", help="film the first rollout; .mp4 or .gif")
 
 
 def _compare(verb: Parser) -> None:
@@ -148,10 +155,24 @@ def _compare(verb: Parser) -> None:
     _add_out(verb)
 
 
+def _study(verb: Parser) -> None:
+    """run an experiment of the studies, draw its figures and check its claims"""
+    verb.add_argument("id", nargs="?", metavar="ID", help="a study of --list, or the folder of one")
+    verb.add_argument("--list", action="store_true", help="list the studies and what they are about")
+    verb.add_argument("--seeds", type=integer(1), metavar="N", help="how many seeds (as the study says)")
+    verb.add_argument("--jobs", type=integer(1), default=1, metavar="J", help="runs side by side (1)")
+    verb.add_argument("--out", metavar="DIR", help="folder for the results; a study that was stopped goes on there")
+
+
 def _add_environment(verb: Parser, *, required: bool = True) -> None:
     verb.add_argument("--env", required=required, metavar="ID", help="a Gymnasium id, such as pbcs/Maze-v0")
     verb.add_argument("--env-kwargs", type=json_object, default={}, metavar="JSON",
                       help="options of the environment, such as '{\"size\": 5}'")
+    verb.add_argument("--goal", metavar="RULE", help="what a success is, such as 'reward>0' or 'qpos[0]>=0.45', in "
+                                                     "place of what the environment reports")
+    verb.add_argument("--start-seed", type=integer(0), metavar="N",
+                      help="begin every episode as reset(seed=N) does, for environments that draw start and goal")
+    verb.add_argument("--feature", metavar="RULE", help="what is explored, such as 'qpos[0:2]' or 'obs[0],obs[3]'")
 
 
 def _add_seed(verb: Parser) -> None:

@@ -9,12 +9,13 @@ from platform import platform, python_version
 from typing import Any
 
 from pbcs_ompl.bridge.building import PlannerSpec
+from pbcs_ompl.cli.models import describe
 from pbcs_ompl.cli.terminal import conclude
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.registry import load_environments, names
 
 NEEDED = ("pbcs-ompl", "ompl", "gymnasium", "numpy", "scipy", "numba", "python-fcl", "matplotlib", "rich")
-OPTIONAL = ("torch", "safetensors", "mujoco", "gymnasium-robotics", "stable-baselines3")
+OPTIONAL = ("torch", "safetensors", "mujoco", "gymnasium-robotics", "imageio", "stable-baselines3")
 
 
 def run(arguments: Namespace) -> int:
@@ -101,8 +102,10 @@ def _environments() -> list[str]:
 def _check(arguments: Namespace) -> dict[str, Any]:
     from pbcs_ompl.reset_anywhere import check_resettable, make
 
-    report = check_resettable(make(arguments.env, arguments.env_kwargs))
-    return {"env": report.env_id, "ok": report.ok, "checks": [asdict(check) for check in report.checks]}
+    model = make(arguments.env, arguments.env_kwargs)
+    report = check_resettable(model)
+    return {"env": report.env_id, "ok": report.ok, "checks": [asdict(check) for check in report.checks],
+            **describe(model)}
 
 
 def _closing_lines(result: dict[str, Any]) -> list[tuple[str, str]]:
@@ -120,4 +123,7 @@ def _closing_lines(result: dict[str, Any]) -> list[tuple[str, str]]:
         verdict = "can be" if result["environment"]["ok"] else "CANNOT be trusted to be"
         lines.append(("reset", f"{result['environment']['env']} {verdict} reset anywhere"))
         lines += [("", f"{'ok  ' if c['ok'] else 'FAIL'} {c['name']} {c['detail']}".rstrip()) for c in checks]
+        found = result["environment"]
+        abilities = f"{', '.join(found['capabilities'])}; {found['adapter']}, {found['state_size']} numbers a state"
+        lines += [("can", abilities), ("feature", found["feature"]), ("goal", found["goal"])]
     return lines

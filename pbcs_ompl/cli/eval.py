@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pbcs_ompl.cli.terminal import conclude, percent, short
+from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.reset_anywhere import make
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.evaluation import evaluate
@@ -16,8 +17,13 @@ def run(arguments: Namespace) -> int:
     folder = Path(arguments.dir)
     chain = SkillChain.load(folder / CHAIN if (folder / CHAIN).is_dir() else folder)
     model = make(chain.env_id, chain.env_kwargs)
+    if arguments.video:
+        check_video(arguments.video)
     evaluation = evaluate(chain, model, episodes=arguments.episodes, epsilon=arguments.epsilon)
     summary = evaluation.summary()
+    if arguments.video:
+        write_video(model, chain.rollout(model, model.initial_state(0), epsilon=arguments.epsilon), arguments.video)
+        summary["video"] = arguments.video
     conclude(summary, _closing_lines(arguments, summary), as_json=arguments.json)
     return 0 if summary["success_rate"] > 0 else 1
 
@@ -28,6 +34,8 @@ def _closing_lines(arguments: Namespace, summary: dict[str, Any]) -> list[tuple[
              ("rollouts", f"{summary['episodes']} from the start{noise}")]
     if summary["steps_median"] is not None:
         lines.append(("steps", f"{short(summary['steps_median'])} to the goal, median"))
+    if arguments.video:
+        lines.append(("video", arguments.video))
     if not arguments.epsilon:
         lines.append(("next", f"pbcs eval {arguments.dir} --epsilon 0.1"))
     return lines

@@ -5,8 +5,10 @@ from pathlib import Path
 
 from pbcs_ompl.bridge.plan import PlanResult, plan
 from pbcs_ompl.cli.folders import environment_words, fresh_folder
+from pbcs_ompl.cli.models import note_rules
 from pbcs_ompl.cli.pictures import draw_tree
 from pbcs_ompl.cli.terminal import Report, conclude, duration, list_files, short
+from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.reset_anywhere import make
 
 
@@ -14,11 +16,16 @@ def run(arguments: Namespace) -> int:
     """Plan, draw, report. Returns 1 when the goal was not reached within the budget."""
     out = Path(arguments.out or fresh_folder("plan", arguments.env, arguments.planner, arguments.seed))
     model = make(arguments.env, arguments.env_kwargs)
+    note_rules(model)
+    if arguments.video:
+        check_video(arguments.video)
     with Report("plan", budget=arguments.max_transitions, max_seconds=arguments.max_seconds) as report:
         result = plan(model, arguments.planner, planner_kwargs=arguments.planner_kwargs, seed=arguments.seed,
                       max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds, out=out,
                       on_progress=report)
     draw_tree(model, result, out)
+    if arguments.video and result.trajectory is not None:
+        write_video(model, result.trajectory.states, arguments.video)
     conclude(result.summary(), _closing_lines(arguments, result, out), as_json=arguments.json)
     return 0 if result.solved else 1
 

@@ -47,7 +47,7 @@ def _train(arguments: Namespace, out: Path) -> TrainResult:
         trajectory = None if arguments.path is None else _read_trajectory(Path(arguments.path))
         return train(arguments.env, env_kwargs=arguments.env_kwargs, trajectory=trajectory, out=out,
                      method=arguments.method, agent=arguments.agent, preset=arguments.preset,
-                     seed=arguments.seed, on_progress=report, **budget)
+                     seed=arguments.seed, device=arguments.device, on_progress=report, **budget)
 
 
 def _refuse_other_options(arguments: Namespace) -> None:

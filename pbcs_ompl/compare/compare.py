@@ -13,7 +13,7 @@ from pbcs_ompl.bridge.stopping import Limits, checked_limits
 from pbcs_ompl.bridge.versions import planning_versions
 from pbcs_ompl.compare.database import write_database
 from pbcs_ompl.compare.pool import run_all
-from pbcs_ompl.compare.run import Job, broken
+from pbcs_ompl.compare.run import Job, broken, run
 from pbcs_ompl.compare.statistics import Record, row
 from pbcs_ompl.core.contracts import ProgressCallback
 from pbcs_ompl.core.errors import (
@@ -121,7 +121,8 @@ def _records(settings: Settings, workers: int, folder: Path | None,
     for record in chain(_finished(jobs, folder), _unavailable(jobs)):
         records.setdefault((record["planner"], record["seed"]), record)
     _report(records, on_progress)
-    for record in run_all([job for job in jobs if (job.planner, job.seed) not in records], workers):
+    missing = [job for job in jobs if (job.planner, job.seed) not in records]
+    for record in run_all(missing, workers, run, broken):
         records[record["planner"], record["seed"]] = record
         if folder is not None:
             write_json(_file(folder, record["planner"], record["seed"]), record)

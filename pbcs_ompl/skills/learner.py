@@ -1,32 +1,17 @@
 """An agent that learns one skill after another along the milestones of a plan."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray, Counter, IndexArray, ResetAnywhere
+from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere
+from pbcs_ompl.skills.agent_door import Agent
 from pbcs_ompl.skills.chain import Skill
-from pbcs_ompl.skills.episodes import Episodes, run_episodes
+from pbcs_ompl.skills.episodes import Act, Episodes, run_episodes
 from pbcs_ompl.skills.goals import Goal
 from pbcs_ompl.skills.milestones import Milestones
 from pbcs_ompl.skills.policy import Frame, SkillPolicy
-
-
-class Agent(Protocol):
-    """What skill training needs of an agent: a stack of seeds, of which it uses one. Arrays are [S, B, ...]."""
-
-    num_updates: int
-
-    def act(self, observations: Array) -> Array: ...
-    def remember(self, observations: Array, actions: Array, rewards: Array, next_observations: Array,
-                 terminals: BoolArray) -> None: ...
-    def train(self, num_updates: int) -> Any: ...
-    def value(self, observations: Array, actions: Array) -> Array: ...
-    def policy(self, seed_index: int = 0) -> Any: ...
-    def forget(self) -> None: ...
-    def state_dict(self) -> dict[str, np.ndarray]: ...
-    def load_state_dict(self, state: dict[str, np.ndarray]) -> None: ...
 
 
 class Learner:
@@ -60,7 +45,7 @@ class Learner:
         self.frame: Frame = self.milestones.frame(goal_index)
 
     def begin(self, goal_index: int) -> None:
-        """Start a new skill that ends at `goal_index`: an empty replay buffer and, unless warm-started, new networks."""
+        """Start a new skill that ends at `goal_index`: no replay and, without `warm_start`, new networks."""
         self.aim(goal_index)
         self.agent.forget()
         if not self.settings.warm_start and self.agent.num_updates:
@@ -81,10 +66,14 @@ class Learner:
         """Return the agent's actions [B, A] in states [B, D]."""
         return self.agent.act(self.frame(self.model.observe(states))[None])[0]
 
+    def explore(self, states: Array) -> Array:
+        """Return the actions [B, A] that the agent itself would try in states [B, D]."""
+        return self.agent.explore(self.frame(self.model.observe(states))[None])[0]
+
     def test(self, index: int) -> float:
         """Return the share of beta episodes from the ball of milestone `index` that reach the goal."""
         starts = self.milestones.starts(np.full(self.settings.beta, index), self.rng)
-        return self._run(starts, self.settings.test_epsilon).success_rate
+        return self._run(self.act, starts, self.settings.test_epsilon).success_rate
 
     def session(self, index: int) -> float:
         """Train on beta episodes from the ball of milestone `index`; return the share that reached the goal.
@@ -102,7 +91,7 @@ class Learner:
         reached = 0.0
         for first in range(0, len(indices), self.settings.episodes_together):
             starts = self.milestones.starts(indices[first:first + self.settings.episodes_together], self.rng)
-            episodes = self._run(starts, self.settings.epsilon)
+            episodes = self._run(self.explore, starts, self.settings.epsilon)
             self._remember(episodes)
             self._train(episodes.transitions)
             reached += episodes.reached.sum()
@@ -134,8 +123,8 @@ class Learner:
         self.agent = self.make_agent(self.agent_seed)
         self.agent.load_state_dict(arrays)
 
-    def _run(self, starts: Array, epsilon: float) -> Episodes:
-        episodes = run_episodes(self.model, self.act, self.goal, starts, epsilon=epsilon,
+    def _run(self, act: Act, starts: Array, epsilon: float) -> Episodes:
+        episodes = run_episodes(self.model, act, self.goal, starts, epsilon=epsilon,
                                 max_steps=self.settings.max_steps, rng=self.rng, shaped=self.settings.shaped)
         self.counter.count += episodes.transitions
         return episodes

@@ -20,12 +20,14 @@ class OneSkillState:
         sessions: Sessions at this place so far.
         tested: Whether this start point has been tested since the last change.
         solved: Whether the policy has passed its last test, from milestone 0.
+        filled: Whether the replay buffer has been filled beforehand, by methods that do so.
     """
 
     start: int
     sessions: int = 0
     tested: bool = False
     solved: bool = False
+    filled: bool = False
 
 
 class OneSkill(ABC):

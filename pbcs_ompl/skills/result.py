@@ -18,7 +18,7 @@ class TrainResult:
             which a tenth of the actions is random.
         nominal, robust: Those two evaluations; None when there is no complete chain.
         chain: The skills; None when there are none.
-        trajectory: The plan; None for the method "plain", or when none was found.
+        trajectory: The plan; None for methods without one, or when none was found.
         milestones: The states along which skills were trained [N+1, D]; None without a plan.
         plan_transitions, train_transitions: Environment steps of the two phases; evaluations are not counted.
         updates: Gradient steps.

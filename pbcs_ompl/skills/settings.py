@@ -36,6 +36,7 @@ class SkillSettings:
         window: Share of the plan that one window of the original Backplay spans.
         window_sessions: Sessions the original Backplay stays in one window.
         pretest: PB tests a new start point before training there (Fig. 5.1b).
+        explored: Transitions of Ex that "bootstrapped" and "offline" begin with (section 4.4).
     """
 
     alpha: int = 10
@@ -60,10 +61,11 @@ class SkillSettings:
     window: float = 0.1
     window_sessions: int = 10
     pretest: bool = True
+    explored: int = 10_000
 
     def __post_init__(self) -> None:
         for name in ("alpha", "beta", "max_steps", "episodes_together", "min_stride", "max_stride",
-                     "window_sessions"):
+                     "window_sessions", "explored"):
             self._require(name, getattr(self, name) >= 1, "at least 1")
         self._require("verify_episodes", self.verify_episodes >= 0, "at least 0")
         for name in ("epsilon", "test_epsilon", "rehearsal"):

@@ -19,7 +19,7 @@ from pbcs_ompl.core.run_folder import RunFolder, read_json, write_json
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.checkpoint import read_checkpoint, write_checkpoint
-from pbcs_ompl.skills.config import METHODS, TrainConfig
+from pbcs_ompl.skills.config import METHODS, WITHOUT_PLAN, TrainConfig
 from pbcs_ompl.skills.evaluation import evaluate
 from pbcs_ompl.skills.learner import Learner
 from pbcs_ompl.skills.method import Method
@@ -62,7 +62,7 @@ class Training:
     def _run(self, trajectory: Trajectory | None) -> TrainResult:
         self._write_config()
         trajectory, planned = self._plan(trajectory)
-        if trajectory is None and self.config.method != "plain":
+        if trajectory is None and self.config.method not in WITHOUT_PLAN:
             return self._finish(None, None, planned, "the planner found no way to the goal within the budget")
         method = self._method(trajectory, planned)
         return self._finish(method, trajectory, planned, self._train(method))
@@ -72,13 +72,14 @@ class Training:
         if self.folder and not self.resumed:
             self.folder.write_config({
                 "env": self.model.env_id, "method": config.method, "agent": config.agent, "preset": config.preset,
-                "seed": config.seed, "max_transitions": config.max_transitions, "env_kwargs": self.model.env_kwargs,
+                "seed": config.seed, "max_transitions": config.max_transitions, "device": config.device,
+                "env_kwargs": self.model.env_kwargs,
                 "settings": config.settings, "agent_settings": config.agent_settings,
                 "versions": planning_versions() | {"torch": version("torch")}})
 
     def _plan(self, trajectory: Trajectory | None) -> tuple[Trajectory | None, int]:
         """Return the plan and the transitions it took."""
-        if self.config.method == "plain":
+        if self.config.method in WITHOUT_PLAN:
             return None, 0
         if self.path and self.resumed and (self.path / PLAN).is_file():
             trajectory = Trajectory.load(self.path / TRAJECTORY)

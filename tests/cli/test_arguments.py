@@ -41,6 +41,9 @@ MISTAKES = [
     ("compare --env pbcs/Maze-v0", "required: --planners"),
     ("compare --env pbcs/Maze-v0 --planners Ex --jobs 0", "expected a whole number of at least 1"),
     ("doctor --env-kwargs 1", "expected a JSON object"),
+    ("study", "the id of a study is missing"),
+    ("study deadlok", "unknown study 'deadlok'; did you mean 'deadlock'?"),
+    ("study deadlock --seeds 0", "expected a whole number of at least 1"),
 ]
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from pbcs_ompl.core.errors import InvalidOption, UnknownName
-from pbcs_ompl.skills.config import TrainConfig
+from pbcs_ompl.skills.config import METHODS, TrainConfig
 from pbcs_ompl.skills.settings import SkillSettings, skill_preset
 
 
@@ -17,7 +17,7 @@ def test_the_thesis_preset_is_the_thesis():
 
 def test_every_preset_is_valid_for_every_method():
     for preset in ("thesis", "fast"):
-        for method in ("pbcs", "pb", "backplay", "plain"):
+        for method in METHODS:
             assert isinstance(skill_preset(preset, method), SkillSettings)
 
 

@@ -1,0 +1,39 @@
+"""What a model can do and is asked to do, in words."""
+
+import sys
+from typing import Any
+
+from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.reset_anywhere.model import FEATURE_KEY, GOAL_KEY
+from pbcs_ompl.reset_anywhere.restorable import RestorableEnv
+
+
+def describe(model: Any) -> dict[str, Any]:
+    """Return adapter, capabilities, size of the state, and feature and goal as sentences."""
+    env = getattr(model, "env", None)
+    return {"adapter": type(env).__name__, "capabilities": sorted(model.capabilities),
+            "state_size": len(model.state_low), "feature": feature_words(model), "goal": goal_words(model)}
+
+
+def feature_words(model: ResetAnywhere) -> str:
+    """Return what is explored, within which bounds, and where these come from."""
+    env = getattr(model, "env", None)
+    rule = model.env_kwargs.get(FEATURE_KEY, "the adapter's choice")
+    source = f", from {env.bounds_from}" if isinstance(env, RestorableEnv) else ""
+    return f"{rule}: {_vector(model.feature_low)} to {_vector(model.feature_high)}{source}"
+
+
+def goal_words(model: ResetAnywhere) -> str:
+    """Return what a success is."""
+    rule = model.env_kwargs.get(GOAL_KEY, "what the environment reports")
+    return f"{rule} (distance < {model.goal_threshold:g})"
+
+
+def note_rules(model: ResetAnywhere) -> None:
+    """Tell on stderr what is explored and sought where an adapter, not the environment, decides it."""
+    if isinstance(getattr(model, "env", None), RestorableEnv):
+        print(f"feature   {feature_words(model)}\ngoal      {goal_words(model)}", file=sys.stderr)
+
+
+def _vector(values: Array) -> str:
+    return "[" + ", ".join(f"{value:.3g}" for value in values) + "]"

@@ -1,0 +1,102 @@
+"""A study as a folder: `sweep.toml` says what is run, `study.py` how, `analysis.py` what follows from it."""
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pbcs_ompl
+from pbcs_ompl.core.errors import DamagedFile, PbcsError, UnknownName
+from pbcs_ompl.core.run_folder import read_toml
+from pbcs_ompl.studies.claims import Claim
+
+SWEEP, SCRIPT, ANALYSIS = "sweep.toml", "study.py", "analysis.py"
+STUDIES = Path("examples", "studies")
+Settings = dict[str, Any]
+"""What a run is a function of: plain values, with a "name" that no other run of the study has."""
+Record = dict[str, Any]
+"""What a run found: plain values."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """An experiment.
+
+    Attributes:
+        id: The name of its folder.
+        folder: Where its three files lie.
+        title: One line, from the sweep.
+        seeds: How many seeds it runs unless told otherwise, from the sweep.
+        sweep: The rest of the sweep.
+        runs: From the sweep and a number of seeds to the settings of every run; in `study.py`.
+        run: From settings to a record, called in another process; in `study.py`.
+        analyse: From all records and a folder for figures to claims; in `analysis.py`.
+    """
+
+    id: str
+    folder: Path
+    title: str
+    seeds: int
+    sweep: dict[str, Any]
+    runs: Callable[[dict[str, Any], int], list[Settings]]
+    run: Callable[[Settings], Record]
+    analyse: Callable[[list[Record], Path], list[Claim]]
+
+
+def study_ids() -> dict[str, str]:
+    """Return the titles of all studies at hand, by id."""
+    return {name: str(_sweep(folder).get("title", "")) for name, folder in sorted(_folders().items())}
+
+
+def find_study(name: str) -> Study:
+    """Return the study of this id, or in the folder of this name.
+
+    Studies are looked for in `examples/studies` below the working directory, then below this project's own folder.
+
+    Raises:
+        UnknownName: there is none; the closest is suggested.
+        DamagedFile: the sweep does not parse, or lacks `title` or `seeds`.
+        PbcsError: a script does not run, or lacks a function.
+    """
+    folder = Path(name) if (Path(name) / SCRIPT).is_file() else _folders().get(name)
+    if folder is None:
+        raise UnknownName("study", name, _folders())
+    sweep = _sweep(folder)
+    script, analysis = _load(folder / SCRIPT, "runs", "run"), _load(folder / ANALYSIS, "analyse")
+    for key in ("title", "seeds"):
+        if key not in sweep:
+            raise DamagedFile(f"{folder / SWEEP} lacks {key!r}")
+    title, seeds = sweep.pop("title"), sweep.pop("seeds")
+    return Study(folder.resolve().name, folder, title, seeds, sweep, script.runs, script.run, analysis.analyse)
+
+
+def _folders() -> dict[str, Path]:
+    roots = (Path(pbcs_ompl.__file__).parents[1] / STUDIES, STUDIES)
+    return {path.parent.name: path.parent for root in roots for path in root.glob(f"*/{SCRIPT}")}
+
+
+def _sweep(folder: Path) -> dict[str, Any]:
+    return read_toml(folder / SWEEP)
+
+
+def _load(path: Path, *functions: str) -> ModuleType:
+    """Import a script afresh, under a name of its own, and see that it has these functions."""
+    name = f"pbcs_study_{path.resolve().parent.name}_{path.stem}".replace("-", "_")
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise PbcsError(f"cannot import {path}")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except PbcsError:
+        raise
+    except Exception as error:
+        raise PbcsError(f"{path} does not run: {type(error).__name__}: {error}") from error
+    lacking = [function for function in functions if function not in vars(module)]
+    if lacking:
+        raise PbcsError(f"{path} lacks {', '.join(lacking)}")
+    return module
