@@ -27,7 +27,7 @@ def main(size: str = "2", folder: str = "runs/example-chain") -> None:
 
     result.chain.save(folder)
     chain = pbcs_ompl.SkillChain.load(folder)
-    rollout = chain.rollout(model, model.initial_state())
+    rollout = chain.rollout(model)
     sets = [(skill.activation.center, skill.activation.radius) for skill in chain.skills]
     figure = chain_figure(model, trajectory=plan.trajectory.states, rollout=rollout, activations=sets)
     print(f"chain and picture in {save(figure, Path(folder) / 'chain.png').parent}")

@@ -22,7 +22,7 @@ def run(arguments: Namespace) -> int:
     evaluation = evaluate(chain, model, episodes=arguments.episodes, epsilon=arguments.epsilon)
     summary = evaluation.summary()
     if arguments.video:
-        write_video(model, chain.rollout(model, model.initial_state(0), epsilon=arguments.epsilon), arguments.video)
+        write_video(model, chain.rollout(model, epsilon=arguments.epsilon), arguments.video)
         summary["video"] = arguments.video
     conclude(summary, _closing_lines(arguments, summary), as_json=arguments.json)
     return 0 if summary["success_rate"] > 0 else 1

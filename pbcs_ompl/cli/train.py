@@ -68,8 +68,7 @@ def _draw(result: TrainResult, out: Path) -> None:
         return
     model = make(result.chain.env_id, result.chain.env_kwargs)
     trajectory = None if result.trajectory is None else result.trajectory.states
-    start = model.initial_state(result.seed)
-    rollout = None if result.stalled else result.chain.rollout(model, start)
+    rollout = None if result.stalled else result.chain.rollout(model)
     title = (f"{model.env_id}: {len(result.chain.skills)} skills, "
              f"{result.train_transitions:,} transitions, {result.updates:,} updates")
     draw_chain(model, result.chain, trajectory, rollout, title, out)

@@ -54,11 +54,13 @@ class SkillChain:
 
     Attributes:
         skills: In the order of execution.
+        start: The state it was trained to start from [D].
         env_id, env_kwargs: The environment it was trained in.
         time_limit: Steps after which an execution counts as failed.
     """
 
     skills: tuple[Skill, ...]
+    start: Array
     env_id: str
     env_kwargs: dict[str, Any]
     time_limit: int
@@ -67,7 +69,7 @@ class SkillChain:
     def of(cls, skills: list[Skill], milestones: Milestones) -> "SkillChain":
         """Return the chain of skills that were trained along `milestones`."""
         model, limit = milestones.model, PATIENCE * milestones.settings.max_steps * len(skills)
-        return cls(tuple(skills), model.env_id, model.env_kwargs, limit)
+        return cls(tuple(skills), milestones.states[0], model.env_id, model.env_kwargs, limit)
 
     def check_belongs_to(self, model: ResetAnywhere) -> None:
         """Raise Mismatch when the chain was trained in another environment."""
@@ -103,17 +105,18 @@ class SkillChain:
                 break
         return Rollouts(success, steps, controller.current, np.array(trace))
 
-    def rollout(self, model: ResetAnywhere, state: Array, *, epsilon: float = 0.0,
+    def rollout(self, model: ResetAnywhere, state: Array | None = None, *, epsilon: float = 0.0,
                 rng: np.random.Generator | None = None, max_steps: int | None = None) -> Array:
-        """Return the states [T+1, D] of one execution from `state` [D]."""
-        return self.rollouts(model, state[None], epsilon=epsilon, rng=rng, max_steps=max_steps).states
+        """Return the states [T+1, D] of one execution from `state` [D], by default the chain's start."""
+        first = self.start if state is None else state
+        return self.rollouts(model, first[None], epsilon=epsilon, rng=rng, max_steps=max_steps).states
 
     def save(self, folder: str | Path) -> None:
         """Write chain.json (structure), chain.npz (centres) and chain.safetensors (networks)."""
         folder = Path(folder)
         save_policies(folder / "chain.safetensors", [skill.policy for skill in self.skills])
         write_arrays(folder / "chain.npz", centers=np.array([s.activation.center for s in self.skills]),
-                     goals=np.array([_goal_center(s.goal, s.activation) for s in self.skills]))
+                     goals=np.array([_goal_center(s.goal, s.activation) for s in self.skills]), start=self.start)
         write_json(folder / "chain.json", {
             "format": FORMAT, "version": VERSION, "env_id": self.env_id, "env_kwargs": self.env_kwargs,
             "time_limit": self.time_limit,
@@ -140,7 +143,7 @@ class SkillChain:
                 Skill(policy, Ball(center, entry["radius"]), _goal(entry, goal))
                 for policy, center, goal, entry in zip(policies, arrays["centers"], arrays["goals"],
                                                        structure["skills"], strict=True))
-            return cls(skills, structure["env_id"], structure["env_kwargs"], structure["time_limit"])
+            return cls(skills, arrays["start"], structure["env_id"], structure["env_kwargs"], structure["time_limit"])
         except (KeyError, ValueError) as error:
             raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error
 

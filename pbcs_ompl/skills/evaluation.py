@@ -14,7 +14,7 @@ from pbcs_ompl.skills.chain import SkillChain
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Executions of a chain from the environment's start.
+    """Executions of a chain from its start.
 
     Attributes:
         success_rate: Share of the episodes that reached the target.
@@ -38,11 +38,14 @@ class Evaluation:
 
 def evaluate(chain: SkillChain, model: ResetAnywhere, *, episodes: int = 100, epsilon: float = 0.0,
              seed: int = 0) -> Evaluation:
-    """Execute the chain `episodes` times from the environment's start state.
+    """Execute the chain `episodes` times from the state it was trained to start from.
+
+    In an environment that draws its start or its goal anew at each reset, that is one of many: a chain is a controller
+    for one task, robust to disturbances, not a solution of all tasks.
 
     Args:
         epsilon: Share of actions that are replaced by random ones.
-        seed: Of the random actions, and of the start states (the first is `reset(seed)`, then seed + 1, ...).
+        seed: Of the random actions.
 
     Raises:
         Mismatch: the chain was trained in another environment.
@@ -53,7 +56,7 @@ def evaluate(chain: SkillChain, model: ResetAnywhere, *, episodes: int = 100, ep
     if not 0 <= epsilon <= 1:
         raise InvalidOption(f"epsilon = {epsilon}, expected a share in [0, 1]")
     chain.check_belongs_to(model)
-    starts = np.array([model.initial_state(seed + index) for index in range(episodes)])
+    starts = np.repeat(chain.start[None], episodes, axis=0)
     rollouts = chain.rollouts(model, starts, epsilon=epsilon,
                               rng=SeedTree(seed).child("evaluation").generator())
     arrived = int(rollouts.success.sum())
