@@ -19,11 +19,11 @@ from pbcs_ompl.bridge.tree import TreeArrays, tree_of
 from pbcs_ompl.bridge.versions import planning_versions
 from pbcs_ompl.bridge.watch import failure
 from pbcs_ompl.core.contracts import BatchPlanner, Counter, ProgressCallback, ResetAnywhere
-from pbcs_ompl.core.errors import InvalidOption, PbcsError
+from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.registry import load_environments
 from pbcs_ompl.core.run_folder import CONFIG, RESULT, RunFolder
 from pbcs_ompl.core.seeding import SeedTree
-from pbcs_ompl.reset_anywhere import adapt, make
+from pbcs_ompl.reset_anywhere import make, open_model
 
 TRAJECTORY = "trajectory.npz"
 TREE = "tree.npz"
@@ -66,7 +66,7 @@ def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
         RunFolderError: `out` exists, is in use, or cannot be written.
     """
     limits = checked_limits(max_transitions, max_seconds)
-    model = _open(env, env_kwargs)
+    model = open_model(env, env_kwargs)
     spec = PlannerSpec(planner, planner_kwargs or {})
     with _new_folder(out) as folder:
         counter = Counter(limits.max_transitions)
@@ -117,14 +117,6 @@ def _solution(problem: Problem, spec: PlannerSpec, seed: int) -> Trajectory | No
     trajectory = to_trajectory(setup.getSolutionPath(), model, planner=spec.name, seed=seed)
     reached = model.goal_distance(trajectory.states[-1:])[0] < model.goal_threshold
     return trajectory if reached else None
-
-
-def _open(env: str | gymnasium.Env | ResetAnywhere, env_kwargs: dict[str, Any] | None) -> ResetAnywhere:
-    if isinstance(env, str):
-        return make(env, env_kwargs or {})
-    if env_kwargs:
-        raise InvalidOption("env_kwargs go with the id of an environment; this one is built already")
-    return adapt(env)
 
 
 def _fresh(model: ResetAnywhere) -> ResetAnywhere:

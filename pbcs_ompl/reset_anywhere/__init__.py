@@ -8,6 +8,6 @@ Example:
 
 from pbcs_ompl.reset_anywhere.adapt import adapt
 from pbcs_ompl.reset_anywhere.check import Check, ResetReport, check_resettable
-from pbcs_ompl.reset_anywhere.make import make
+from pbcs_ompl.reset_anywhere.make import make, open_model
 
-__all__ = ["Check", "ResetReport", "adapt", "check_resettable", "make"]
+__all__ = ["Check", "ResetReport", "adapt", "check_resettable", "make", "open_model"]

@@ -66,6 +66,20 @@ def make(env_id: str, env_kwargs: dict[str, Any] | None = None, *, goal: str | G
     return model
 
 
+def open_model(env: str | gymnasium.Env | ResetAnywhere, env_kwargs: dict[str, Any] | None = None) -> ResetAnywhere:
+    """Return the model of what a user names as an environment: an id, an environment, or a model.
+
+    Raises:
+        InvalidOption: options for an environment that is built already.
+        UnknownName, MissingDependency, NoResetAnywhere, UnsupportedSpace: see `make` and `adapt`.
+    """
+    if isinstance(env, str):
+        return make(env, env_kwargs or {})
+    if env_kwargs:
+        raise InvalidOption("env_kwargs go with the id of an environment; this one is built already")
+    return adapt(env)
+
+
 def _find(env_id: str) -> EnvSpec:
     module, _, name = env_id.rpartition(":")
     try:

@@ -7,9 +7,9 @@ import gymnasium
 
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.contracts import ProgressCallback, ResetAnywhere
-from pbcs_ompl.core.errors import DamagedFile, InvalidOption, RunFolderError, TrainingStalled, UnknownName
+from pbcs_ompl.core.errors import DamagedFile, RunFolderError, TrainingStalled, UnknownName
 from pbcs_ompl.core.run_folder import CONFIG, RESULT, RunFolder, read_toml
-from pbcs_ompl.reset_anywhere import adapt, make
+from pbcs_ompl.reset_anywhere import make, open_model
 from pbcs_ompl.skills.config import TrainConfig
 from pbcs_ompl.skills.result import TrainResult
 from pbcs_ompl.skills.training import CHECKPOINT, Training
@@ -37,7 +37,7 @@ def train(env: str | gymnasium.Env | ResetAnywhere, *, env_kwargs: dict[str, Any
         TrainingStalled: the budget ended first; its `result` holds what was learnt so far.
     """
     config = _config(options)
-    model = _open(env, env_kwargs)
+    model = open_model(env, env_kwargs)
     if trajectory is not None:
         trajectory.check_belongs_to(model)
     if out is None:
@@ -83,11 +83,3 @@ def _config(options: dict[str, Any]) -> TrainConfig:
         if name not in known:
             raise UnknownName("option of train", name, known)
     return TrainConfig(**options)
-
-
-def _open(env: str | gymnasium.Env | ResetAnywhere, env_kwargs: dict[str, Any] | None) -> ResetAnywhere:
-    if isinstance(env, str):
-        return make(env, env_kwargs or {})
-    if env_kwargs:
-        raise InvalidOption("env_kwargs go with the id of an environment; this one is built already")
-    return adapt(env) if isinstance(env, gymnasium.Env) else env
