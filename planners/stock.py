@@ -4,8 +4,7 @@ OMPL draws from one random stream for the whole process: `build` seeds it, and e
 when the problem was built after the seeding too, as `pbcs_ompl.bridge` does.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 from ompl import control as oc
 from ompl import util as ou
 
+from pbcs_ompl.bridge.problem import quiet_ompl
 from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable
 from planners.grid_decomposition import grid_over
 from planners.options import check_names, positive_integer
@@ -48,7 +48,7 @@ class StockPlanner:
         offered = {option: setter for option, (setter, _) in self.options.items() if hasattr(kind, setter)}
         check_names(self.name, options, [*offered, "hold"])
         hold = positive_integer("hold", options.get("hold", 1))
-        with _quiet():
+        with quiet_ompl():
             if hold > 1:
                 si.setMinMaxControlDuration(1, hold)
             ou.RNG.setSeed(max(1, seed))
@@ -74,17 +74,6 @@ def _set(planner: Any, name: str, option: str, setter: str, value: Any) -> None:
     except TypeError as error:
         reason = str(error).splitlines()[0]
         raise InvalidOption(f"planner {name!r} refused {option}={value!r}: {reason}") from error
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep OMPL from saying that it was seeded late; what is built afterwards follows the seed even so."""
-    level = ou.getLogLevel()
-    ou.setLogLevel(ou.LOG_NONE)
-    try:
-        yield
-    finally:
-        ou.setLogLevel(level)
 
 
 RRT = StockPlanner("RRT", {

@@ -1,6 +1,5 @@
 """Compare planners: planners x seeds on one environment, each run recorded, with intervals."""
 
-import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -20,10 +19,9 @@ from pbcs_ompl.core.errors import (
     InvalidOption,
     MissingDependency,
     PlannerUnavailable,
-    RunFolderError,
     did_you_mean,
 )
-from pbcs_ompl.core.run_folder import CONFIG, RESULT, RunFolder, read_json, read_toml, to_toml, write_json
+from pbcs_ompl.core.run_folder import RESULT, open_run, read_json, write_json
 from pbcs_ompl.reset_anywhere import make
 
 DATABASE = "comparison.db"
@@ -81,7 +79,7 @@ def compare(planners: Sequence[str], env: str, *, env_kwargs: dict[str, Any] | N
     for planner in settings["planners"]:
         _why_unavailable(planner, settings["planner_kwargs"].get(planner, {}))
     folder = None if out is None else Path(out)
-    with nullcontext() if folder is None else _open(folder, settings):
+    with nullcontext() if folder is None else open_run(folder, settings):
         records = _records(settings, jobs, folder, on_progress)
         rows = [row(planner, [record for record in records if record["planner"] == planner], max_transitions)
                 for planner in planners]
@@ -161,16 +159,3 @@ def _report(records: dict[tuple[str, int], Record], on_progress: ProgressCallbac
 
 def _file(folder: Path, planner: str, seed: int) -> Path:
     return folder / RUNS / f"{planner.replace(':', '.')}-{seed}.json"
-
-
-def _open(folder: Path, settings: Settings) -> RunFolder:
-    """Open a new folder, or one that was stopped in the middle of the same comparison."""
-    if not (folder / CONFIG).is_file():
-        opened = RunFolder(folder)
-        opened.write_config(settings)
-        return opened
-    before, now = read_toml(folder / CONFIG), tomllib.loads(to_toml(settings))
-    different = sorted(key for key in before.keys() | now.keys() if before.get(key) != now.get(key))
-    if different:
-        raise RunFolderError(f"{folder} holds another run ({', '.join(different)}); choose another --out")
-    return RunFolder(folder, resume=True)

@@ -66,6 +66,23 @@ class RunFolder:
         write_json(self.path / RESULT, result)
 
 
+def open_run(path: Path, config: dict[str, Any]) -> RunFolder:
+    """Open a new folder for a run with these settings, or go on in the one where the same run was stopped.
+
+    Raises:
+        RunFolderError: the folder holds something else or a run with other settings, is in use, or cannot be written.
+    """
+    if not (path / CONFIG).is_file():
+        opened = RunFolder(path)
+        opened.write_config(config)
+        return opened
+    before, now = read_toml(path / CONFIG), tomllib.loads(to_toml(config))
+    different = sorted(key for key in before.keys() | now.keys() if before.get(key) != now.get(key))
+    if different:
+        raise RunFolderError(f"{path} holds another run ({', '.join(different)}); choose another --out")
+    return RunFolder(path, resume=True)
+
+
 @contextmanager
 def clear_write_errors(path: Path) -> Iterator[None]:
     """Turn an OSError while writing below `path` into one clear line."""

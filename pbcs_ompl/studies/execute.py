@@ -1,6 +1,5 @@
 """Run a study: every run in a process of its own, one file for each record, then the analysis."""
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,8 +7,8 @@ from typing import Any, NamedTuple
 
 from pbcs_ompl.compare.pool import run_all
 from pbcs_ompl.core.contracts import ProgressCallback
-from pbcs_ompl.core.errors import InvalidOption, PbcsError, RunFolderError
-from pbcs_ompl.core.run_folder import CONFIG, RunFolder, read_json, read_toml, to_toml, write_json
+from pbcs_ompl.core.errors import InvalidOption, PbcsError
+from pbcs_ompl.core.run_folder import open_run, read_json, write_json
 from pbcs_ompl.studies.claims import Claim
 from pbcs_ompl.studies.study import Record, Settings, Study, find_study
 
@@ -81,7 +80,7 @@ def run_study(study: Study, *, out: str | Path, seeds: int | None = None, jobs: 
         raise InvalidOption(f"seeds={seeds}, jobs={jobs}: expected at least 1 of each")
     settings = study.runs(study.sweep, seeds)
     _check_names(settings)
-    with _open(Path(out), study) as folder:
+    with open_run(Path(out), {"study": study.id, **study.sweep}) as folder:
         records, failed = _records(study, settings, jobs, folder.path, on_progress)
         if not records:
             name, reason = next(iter(failed.items()))
@@ -134,17 +133,3 @@ def _check_names(settings: Sequence[Settings]) -> None:
 def _report(records: dict[str, Record], failed: dict[str, str], on_progress: ProgressCallback | None) -> None:
     if on_progress is not None:
         on_progress({"runs": len(records) + len(failed), "failed": len(failed)})
-
-
-def _open(folder: Path, study: Study) -> RunFolder:
-    """Open a new folder, or one in which the same study was stopped, or ran with other seeds."""
-    config = {"study": study.id, **study.sweep}
-    if not (folder / CONFIG).is_file():
-        opened = RunFolder(folder)
-        opened.write_config(config)
-        return opened
-    before, now = read_toml(folder / CONFIG), tomllib.loads(to_toml(config))
-    different = sorted(key for key in before.keys() | now.keys() if before.get(key) != now.get(key))
-    if different:
-        raise RunFolderError(f"{folder} holds another run ({', '.join(different)}); choose another --out")
-    return RunFolder(folder, resume=True)

@@ -47,6 +47,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sizes", type=int, nargs="+", default=[2, 3, 4, 5, 7])
     parser.add_argument("--seeds", type=int, help="runs of each size (default: 20, ten for 7x7, five above)")
+    parser.add_argument("--first-seed", type=int, default=0, help="100 for seeds that no setting was chosen on (0)")
     parser.add_argument("--method", default="pbcs")
     parser.add_argument("--preset", default="fast")
     parser.add_argument("--max-transitions", type=int, default=BUDGET)
@@ -56,7 +57,8 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|")
     with ProcessPoolExecutor(options.jobs, mp_context=get_context("spawn")) as pool:
         for size in options.sizes:
-            seeds = range(options.seeds or SEEDS.get(size, 5))
+            count = options.seeds or SEEDS.get(size, 5)
+            seeds = range(options.first_seed, options.first_seed + count)
             futures = [pool.submit(run, size, seed, options.method, options.preset, options.max_transitions)
                        for seed in seeds]
             runs = [future.result() for future in futures]

@@ -151,7 +151,8 @@ def test_folder_that_exists_is_refused_and_resumed_only_on_demand(tmp_path):
 def test_empty_folder_and_one_of_a_killed_run_are_taken(tmp_path):
     RunFolder(tmp_path).close()
     (tmp_path / ".lock").write_text("")
-    RunFolder(tmp_path).close()
+    with RunFolder(tmp_path) as folder:
+        assert folder.path == tmp_path
 
 
 OPEN = ("import sys; from pbcs_ompl.core.run_folder import RunFolder; "
