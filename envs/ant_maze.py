@@ -79,7 +79,7 @@ class AntMazeEnv(BatchedMujocoEnv):
     def goal_distance(self, states: Array) -> Array:
         """Return the distances [B] from the torso to the centre of the goal in metres."""
         away = np.asarray(states)[:, TORSO] - self.goal
-        return np.sqrt(np.square(away).sum(axis=1))
+        return np.hypot(away[:, 0], away[:, 1])
 
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, D] are within the bounds with the torso's centre in no wall [B]."""

@@ -19,8 +19,9 @@ class LeastExpanded(Strategy):
 
     Differs: none when nodes are expanded one at a time, as they are wherever the environment's step is
     compiled or `batch=1`. Otherwise as many nodes are selected together as bins are tied for the lowest
-    count: Alg. 5 would select each of these bins before any other too, unless a new bin cuts in. More
-    than that makes Ex forget its dives into new bins, and costs it many times the transitions.
+    count: Alg. 5 would select each of these bins before any other too, unless a new bin cuts in. Where the
+    environment keeps several cores busy with p states (`parallel_batch`), it is that number rounded down to a
+    multiple of p, at least p. Larger batches make Ex forget its dives into new bins, which costs transitions.
 
     Args:
         bin_size: Edge length of the bins, one for all features or one for each; by default what the problem
@@ -48,8 +49,9 @@ class LeastExpanded(Strategy):
         return self.queue.nbytes
 
     def batch(self, tree: Tree) -> int:
-        """Return the number of bins that are tied for the lowest count."""
-        return tied_bins(self.queue)
+        """Return the number of bins that are tied for the lowest count, in whole portions of `parallel_batch`."""
+        portion = self.space.parallel_batch
+        return max(portion, tied_bins(self.queue) // portion * portion)
 
     def select(self, tree: Tree, count: int) -> IndexArray:
         """Return `count` selections in a row; each raises the counts of its node and bin before the next."""

@@ -45,7 +45,7 @@ class ModelDoor(Door):
         """Describe the environment for a strategy."""
         model = self._model
         return Space(model.feature_low, model.feature_high, model.bin_size, model.action_low,
-                     model.action_high, model.max_episode_steps, model.advance_towards)
+                     model.action_high, model.max_episode_steps, model.parallel_batch, model.advance_towards)
 
     def new_tree(self) -> Tree:
         """Return an empty tree of states [D] and features [F]."""

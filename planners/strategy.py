@@ -22,6 +22,7 @@ class Space:
         bin_size: Suggested edge length of bins [F].
         action_low, action_high: Bounds of the controls [A].
         episode_steps: Suggested length of an episode.
+        parallel_batch: How many nodes have to be expanded together to keep all cores busy; 1 where it does not matter.
         steer: Returns controls [B, A] that lead from states [B, D] towards features [B, F]; None if nobody
             can.
     """
@@ -32,6 +33,7 @@ class Space:
     action_low: Array
     action_high: Array
     episode_steps: int = 1000
+    parallel_batch: int = 1
     steer: Callable[[Array, Array], Array] | None = None
 
 

@@ -90,6 +90,12 @@ class MLP:
                                 Norm(take(1, after), take(1, after)) if normed else None))
         return layers
 
+    def take(self, flat: Tensor, members: Sequence[int]) -> Tensor:
+        """Return the buffer of some networks of a stack, by their places in it."""
+        chosen = torch.tensor(members, device=flat.device)
+        return torch.cat([block[chosen].flatten() for layer in self.split(flat)
+                          for block in (layer.weight, layer.bias, *(layer.norm or ()))])
+
     def initial(self, generators: Sequence[torch.Generator]) -> Tensor:
         """Draw parameters [S * P] as torch.nn.Linear does, each seed's from its own generator.
 

@@ -22,6 +22,10 @@ from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 class Noise(Protocol):
     """Turns the actors' actions into those that are tried."""
 
+    def keep(self, indices: Sequence[int]) -> None:
+        """Go on with some of the seeds, by their places: the next `apply` is for them only."""
+        ...
+
     def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
         """Return the random numbers [*shape, n] that `apply` wants."""
         ...
@@ -48,6 +52,9 @@ class EpsilonGreedy:
         if not 0.0 <= self.epsilon <= 1.0:
             raise InvalidOption(f"epsilon is {self.epsilon}, expected a probability in [0, 1]")
 
+    def keep(self, indices: Sequence[int]) -> None:
+        """Do nothing: this noise has no memory."""
+
     def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
         """Draw whether to explore, and where to."""
         return generator.random((*shape, 1 + action_size))
@@ -66,6 +73,9 @@ class Gaussian:
     def __post_init__(self) -> None:
         if not self.sigma >= 0.0:
             raise InvalidOption(f"sigma is {self.sigma}, expected at least 0")
+
+    def keep(self, indices: Sequence[int]) -> None:
+        """Do nothing: this noise has no memory."""
 
     def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
         """Draw normal numbers."""
@@ -87,7 +97,11 @@ class OrnsteinUhlenbeck:
         if not (sigma >= 0.0 and 0.0 <= theta * dt <= 1.0 and dt > 0.0):
             raise InvalidOption(f"sigma={sigma}, theta={theta}, dt={dt}: expected sigma >= 0 and theta dt in [0, 1]")
         self.sigma, self.theta, self.dt = sigma, theta, dt
-        self._x: Array = np.zeros(1)
+        self._x: Array = np.zeros((1, 1, 1))
+
+    def keep(self, indices: Sequence[int]) -> None:
+        """Keep the x of these seeds."""
+        self._x = self._x[list(indices)]
 
     def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
         """Draw normal numbers."""

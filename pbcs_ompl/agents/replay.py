@@ -1,5 +1,6 @@
 """A replay buffer stacked over seeds: one ring of float32 rows for each seed."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -87,10 +88,15 @@ class Replay:
         self.sizes = np.zeros_like(self.sizes)
         self._written = np.zeros_like(self._written)
 
-    def state_dict(self) -> dict[str, np.ndarray]:
-        """Return the contents, up to the longest ring, and the place in the stream of draws."""
-        rows = self._rows[:, : int(self.sizes.max())].cpu().numpy().copy()
-        return {"rows": rows, "written": self._written.copy(), "drawn": np.array(self._drawn)}
+    def state_dict(self, seeds: Sequence[int] | None = None) -> dict[str, np.ndarray]:
+        """Return the contents, up to the longest ring, and the place in the stream of draws.
+
+        Args:
+            seeds: Which rings, by their places; None for all.
+        """
+        chosen = np.arange(len(self.sizes)) if seeds is None else np.array(seeds)
+        rows = self._rows[torch.from_numpy(chosen).to(self._device), : int(self.sizes[chosen].max())]
+        return {"rows": rows.cpu().numpy(), "written": self._written[chosen], "drawn": np.array(self._drawn)}
 
     def can_load(self, state: dict[str, np.ndarray]) -> bool:
         """Tell whether `state` is of a buffer of this shape."""

@@ -85,6 +85,11 @@ class SAC(StackedAgent):
         temperature = {f"temperature/{part}": tensor for part, tensor in self._log_temperature.tensors().items()}
         return super()._tensors() | temperature | {"num_samples": self._num_samples}
 
+    def _part(self, seeds: Sequence[int]) -> dict[str, Tensor]:
+        temperature = {f"temperature/{part}": tensor[list(seeds)]
+                       for part, tensor in self._log_temperature.tensors().items()}
+        return super()._part(seeds) | temperature | {"num_samples": self._num_samples.clone()}
+
     def _inputs(self, first: int, count: int) -> Iterable[tuple[Any, ...]]:
         numbers, settings = range(first, first + count), self.settings
         rates = [self._adam_rates(rate, numbers) for rate in (

@@ -183,11 +183,16 @@ class StackedAgent(ABC):
         layers[-1] = tuple(np.ascontiguousarray(part[..., :actions]) for part in layers[-1])
         return Policy(tuple(layers), self.action_low.copy(), self.action_high.copy())
 
-    def state_dict(self) -> dict[str, np.ndarray]:
-        """Return everything that training needs to go on bit for bit, as named arrays."""
-        state = {name: tensor.cpu().numpy().copy() for name, tensor in self._tensors().items()}
-        state |= {f"replay/{name}": array for name, array in self._replay.state_dict().items()}
-        return state | {"num_updates": np.array(self.num_updates), "seeds": np.array(self.seeds)}
+    def state_dict(self, indices: Sequence[int] | None = None) -> dict[str, np.ndarray]:
+        """Return everything that training needs to go on bit for bit, as named arrays.
+
+        Args:
+            indices: Which agents of the stack; None for all.
+        """
+        chosen = range(len(self.seeds)) if indices is None else indices
+        state = {name: tensor.cpu().numpy() for name, tensor in self._part(chosen).items()}
+        state |= {f"replay/{name}": array for name, array in self._replay.state_dict(chosen).items()}
+        return state | {"num_updates": np.array(self.num_updates), "seeds": np.array(self.seeds)[list(chosen)]}
 
     def load_state_dict(self, state: Mapping[str, np.ndarray]) -> None:
         """Continue from `state_dict()` of an agent with the same settings and seeds.
@@ -210,16 +215,22 @@ class StackedAgent(ABC):
         self._replay.load_state_dict(replay)
         self.num_updates = int(state["num_updates"])
 
-    def clone(self) -> Self:
-        """Return an independent copy that goes on as this one would."""
+    def clone(self, indices: Sequence[int] | None = None) -> Self:
+        """Return an independent copy of the stack, or of some of its agents, that goes on as they would have."""
+        seeds = self.seeds if indices is None else [self.seeds[index] for index in indices]
         copy = type(self)(self.observation_size, self.action_low, self.action_high, settings=self.settings,
-                          seeds=self.seeds, device=self.device, compile=self._compile)
-        copy.load_state_dict(self.state_dict())
+                          seeds=seeds, device=self.device, compile=self._compile)
+        copy.load_state_dict(self.state_dict(indices))
         return copy
 
     def _tensors(self) -> dict[str, Tensor]:
         return {f"{name}/{part}": tensor for name, network in self._networks.items()
                 for part, tensor in network.tensors().items()}
+
+    def _part(self, seeds: Sequence[int]) -> dict[str, Tensor]:
+        """Return copies of `_tensors()` for some seeds, by their places."""
+        return {f"{name}/{part}": tensor for name, network in self._networks.items()
+                for part, tensor in network.part(seeds, len(self.seeds)).items()}
 
     def _network(self, inputs: int, outputs: int, generators: Sequence[torch.Generator]) -> TrainedNetwork:
         network = MLP((inputs, *self.settings.hidden, outputs), self.settings.layer_norm)

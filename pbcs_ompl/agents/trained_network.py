@@ -29,6 +29,15 @@ class TrainedNetwork:
         return {"weights": self.weights.flat, "target": self.target.flat,
                 "mean": self.mean, "square": self.square}
 
+    def part(self, seeds: Sequence[int], count: int) -> dict[str, Tensor]:
+        """Return copies of `tensors()` for some seeds, by their places among all `count`.
+
+        Where there are several networks of each seed, the first ones of all seeds come first.
+        """
+        twins = self.weights.flat.numel() // self.network.num_parameters // count
+        members = [twin * count + seed for twin in range(twins) for seed in seeds]
+        return {name: self.network.take(flat, members) for name, flat in self.tensors().items()}
+
     def descend(self, rate: Tensor) -> None:
         """Make one step of Adam against `gradient`; `rate` is one row of `adam_rates`."""
         _adam_step(self.weights.flat, self.gradient.flat, self.mean, self.square, rate)

@@ -10,6 +10,7 @@ import gymnasium
 from ompl import base as ob
 
 from pbcs_ompl.bridge.building import PlannerSpec
+from pbcs_ompl.bridge.coverage import Trace
 from pbcs_ompl.bridge.path import to_trajectory
 from pbcs_ompl.bridge.problem import Problem, make_problem, quiet_ompl
 from pbcs_ompl.bridge.result import PlanResult
@@ -21,7 +22,7 @@ from pbcs_ompl.bridge.watch import failure
 from pbcs_ompl.core.contracts import BatchPlanner, Counter, ProgressCallback, ResetAnywhere
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.registry import load_environments
-from pbcs_ompl.core.run_folder import CONFIG, RESULT, RunFolder
+from pbcs_ompl.core.run_folder import CONFIG, PROVENANCE, RESULT, RunFolder
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.reset_anywhere import make, open_model
 
@@ -40,7 +41,8 @@ class HoldsError(Protocol):
 def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
          env_kwargs: dict[str, Any] | None = None, planner_kwargs: dict[str, Any] | None = None,
          seed: int = 0, max_transitions: int = 1_000_000, max_seconds: float | None = None,
-         out: str | Path | None = None, on_progress: ProgressCallback | None = None) -> PlanResult:
+         out: str | Path | None = None, coverage: bool = False,
+         on_progress: ProgressCallback | None = None) -> PlanResult:
     """Search a trajectory from the environment's start to its goal.
 
     Only an exact solution counts as solved, and the trajectory is replayed in a fresh environment to see
@@ -57,6 +59,7 @@ def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
         max_transitions: The most environment steps.
         max_seconds: The most wall time of the search; None for any.
         out: A new folder for config.toml, result.json, tree.npz and, when solved, trajectory.npz.
+        coverage: Tell how much of the feature space was seen after how many transitions, in the result's `coverage`.
         on_progress: Called a few times a second with {"transitions", "seconds"}.
 
     Raises:
@@ -70,14 +73,17 @@ def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
     spec = PlannerSpec(planner, planner_kwargs or {})
     with _new_folder(out) as folder:
         counter = Counter(limits.max_transitions)
-        with quiet_ompl(), make_problem(model, seed=seed, counter=counter) as problem:
+        trace = Trace(model) if coverage else None
+        with quiet_ompl(), make_problem(model, seed=seed, counter=counter, trace=trace) as problem:
             trajectory, tree, seconds = _search(problem, spec, seed, limits, on_progress)
         result = PlanResult(
-            solved=trajectory is not None, transitions=counter.count, seconds=seconds, nodes=len(tree.states),
+            solved=trajectory is not None, transitions=counter.count,
+            collision_checks=counter.count + problem.watch.validity_checks, seconds=seconds, nodes=len(tree.states),
             path_length=None if trajectory is None else trajectory.length,
             replay_ok=None if trajectory is None else trajectory.replays_exactly(_fresh(model)),
             planner=spec.name, env=model.env_id, seed=seed, out=None if out is None else str(out),
-            trajectory=trajectory, tree=tree)
+            trajectory=trajectory, tree=tree,
+            coverage=None if trace is None else trace.coverage(tree, counter.count, seconds))
         if folder is not None:
             _write(folder, result, model, spec, limits)
     return result
@@ -93,6 +99,8 @@ def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
     setup.setPlanner(planner)
     setup.setup()
     stop = make_stop(watch, limits.max_seconds, on_progress)
+    if watch.trace is not None:
+        stop = watch.trace.timed(stop, watch.counter)
     with interruptible(lambda: watch.fail(KeyboardInterrupt())):
         began = time.perf_counter()
         try:
@@ -137,7 +145,7 @@ def _new_folder(out: str | Path | None) -> Iterator[RunFolder | None]:
             yield folder
             return
         except BaseException:
-            for name in (TRAJECTORY, TREE, CONFIG, RESULT):
+            for name in (TRAJECTORY, TREE, CONFIG, PROVENANCE, RESULT):
                 (folder.path / name).unlink(missing_ok=True)
             folder.close()
             if not existed:

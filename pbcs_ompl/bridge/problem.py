@@ -8,6 +8,7 @@ import numpy as np
 from ompl import control as oc
 from ompl import util as ou
 
+from pbcs_ompl.bridge.coverage import Trace
 from pbcs_ompl.bridge.goal import EnvironmentGoal
 from pbcs_ompl.bridge.layout import blocks, state_writer
 from pbcs_ompl.bridge.propagator import make_propagator
@@ -52,8 +53,8 @@ class Problem:
         self.setup.setStateValidityChecker(_never)
 
 
-def make_problem(model: ResetAnywhere, *, counter: Counter, start: Array | None = None,
-                 seed: int = 0) -> Problem:
+def make_problem(model: ResetAnywhere, *, counter: Counter, start: Array | None = None, seed: int = 0,
+                 trace: Trace | None = None) -> Problem:
     """Build the control problem of an environment: one control is one step, and costs one transition.
 
     OMPL's random numbers are seeded before anything is built, so equal seeds give equal paths, in this
@@ -64,6 +65,7 @@ def make_problem(model: ResetAnywhere, *, counter: Counter, start: Array | None 
         counter: Counts the transitions against a budget.
         start: The start state [D]; by default the environment's own for `seed`.
         seed: The seed of OMPL's planners and samplers, and of the environment's reset.
+        trace: Takes down the states that the propagator produces, if anybody wants to know.
 
     Raises:
         InvalidState: the start is not finite, outside the bounds or inside a wall.
@@ -76,7 +78,7 @@ def make_problem(model: ResetAnywhere, *, counter: Counter, start: Array | None 
         state_space = make_state_space(model)
         setup = oc.SimpleSetup(make_control_space(state_space, model))
         information = setup.getSpaceInformation()
-        watch = Watch(counter)
+        watch = Watch(counter, trace)
         information.setPropagationStepSize(1.0)
         information.setMinMaxControlDuration(1, 1)
         setup.setStatePropagator(make_propagator(model, watch))

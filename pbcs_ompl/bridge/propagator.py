@@ -20,7 +20,7 @@ def make_propagator(model: ResetAnywhere, watch: Watch) -> Propagator:
 
     The function must not refer to any OMPL object: OMPL holds it, and such a cycle would never be freed.
     """
-    step = model.step_one
+    step = model.step_one if watch.trace is None else watch.trace.recording(model.step_one)
     read, write = state_reader(parts := blocks(len(model.state_low), model.feature_dims)), state_writer(parts)
     read_control = control_reader(len(model.action_low))
     counter = watch.counter

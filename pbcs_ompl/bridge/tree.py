@@ -1,5 +1,6 @@
 """The tree that a planner has grown, as arrays."""
 
+from array import array
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -78,7 +79,9 @@ def tree_of(planner: Any, model: ResetAnywhere, space_information: Any) -> TreeA
     planner.getPlannerData(data)
     read = state_reader(blocks(len(model.state_low), model.feature_dims))
     size = data.numVertices()
-    states = np.array([read(data.getVertex(node).getState()) for node in range(size)])
-    incoming = [data.getIncomingEdges(node) for node in range(size)]
-    parents = np.array([edges[0] if edges else -1 for edges in incoming], dtype=np.int64)
-    return TreeArrays(states.reshape(size, len(model.state_low)), parents, None)
+    numbers, parents = array("d"), np.full(size, -1, dtype=np.int64)
+    for node in range(size):
+        numbers.extend(read(data.getVertex(node).getState()))
+        if children := data.getEdges(node):  # asking for the incoming edges takes five times as long
+            parents[children] = node
+    return TreeArrays(np.frombuffer(numbers).reshape(size, len(model.state_low)), parents, None)

@@ -31,6 +31,7 @@ def make_validity(model: ResetAnywhere, watch: Watch) -> Callable[[Any], bool]:
             for value, least, most in zip(values, low, high, strict=True):
                 if not least <= value <= most:
                     return False
+            watch.validity_checks += 1
             return bool(model.is_valid(np.array([values]))[0])
         except BaseException as error:  # nothing may cross OMPL's C++; `Watch.raise_error` raises it
             watch.fail(error)

@@ -2,6 +2,7 @@
 
 from math import isfinite
 
+from pbcs_ompl.bridge.coverage import Trace
 from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import CallbackFailed, PbcsError
 
@@ -14,15 +15,19 @@ class Watch:
 
     Attributes:
         counter: Where every transition is counted.
+        trace: Where what the planner does is taken down; None when nobody asked.
+        validity_checks: How many states OMPL asked about that the environment had not just produced.
         error: The first exception of a callback.
         refused: A propagation was asked for when nothing was left of the budget.
         reached: The state [D] that the environment produced last, which is therefore valid.
     """
 
-    __slots__ = ("counter", "error", "reached", "refused")
+    __slots__ = ("counter", "error", "reached", "refused", "trace", "validity_checks")
 
-    def __init__(self, counter: Counter):
+    def __init__(self, counter: Counter, trace: Trace | None = None):
         self.counter = counter
+        self.trace = trace
+        self.validity_checks = 0
         self.error: BaseException | None = None
         self.refused = False
         self.reached: list[float] | None = None

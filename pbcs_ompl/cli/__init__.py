@@ -6,18 +6,26 @@ Exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 somethin
 
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
+from typing import Any
 
 from pbcs_ompl.cli.arguments import build_parser, parse
 from pbcs_ompl.core.errors import PbcsError
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status. Every mistake of the user ends in one line on stderr."""
+    """Run one command and return its exit status. Each mistake of the user, and each warning, is one line on stderr."""
     words = list(sys.argv[1:] if argv is None else argv)
     if "" not in sys.path:
         sys.path.append("")  # `--planner my_module:MyPlanner` finds a module in the working directory
+    with warnings.catch_warnings():
+        warnings.showwarning = _warn
+        return _run(words)
+
+
+def _run(words: list[str]) -> int:
     try:
         arguments = parse(build_parser(), words)
         return int(import_module(f"pbcs_ompl.cli.{arguments.verb}").run(arguments))
@@ -26,6 +34,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as error:
         remedy = str(error) or "run the same command again to start over"
         return _complain(error, f"interrupted; {remedy}", 130)
+
+
+def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
+    print("pbcs: warning:", " ".join(str(message).split()), file=sys.stderr)
 
 
 def _complain(error: BaseException, message: str, status: int) -> int:

@@ -4,11 +4,13 @@ import argparse
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from pbcs_ompl.cli.values import choice, fraction, integer, json_object, seconds
+from pbcs_ompl.cli.values import choice, fraction, integer, json_object, part, seconds
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
 METHODS = ("pbcs", "pb", "backplay", "plain", "bootstrapped", "offline")
 PRESETS = ("fast", "thesis")
+EXECUTORS = ("local", "ray")
+SCHEDULERS = ("make", "slurm")
 DESCRIPTION = """\
 Plan with OMPL in any environment that can be reset anywhere,
 then train a chain of skills along the plan.
@@ -20,6 +22,14 @@ examples:
   pbcs compare --planners Ex RRTNH EST KPIECE1 --env pbcs/Maze-v0 --env-kwargs '{"size": 9}' --seeds 10
 
 exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed
+"""
+ON_A_CLUSTER = """\
+on a cluster:
+  pbcs study ID --executor ray --out DIR       on a node of a Ray cluster: as many runs as it has processors
+  pbcs study ID --emit slurm --out DIR         write DIR/slurm.sh, an array with a task for each run
+  pbcs study ID --emit make --out DIR          write DIR/Makefile, for make --jobs
+  pbcs study ID --shard 2/3 --out DIR          the second third of the runs, on a disk that all machines share
+afterwards, or when it was stopped, the same command without --shard makes what is missing, and the analysis
 """
 
 
@@ -55,7 +65,7 @@ def build_parser() -> Parser:
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
-    for add in (_doctor, _plan, _train, _eval, _compare, _study):
+    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report):
         name, purpose = add.__name__.removeprefix("_"), add.__doc__ or ""
         verb = group.add_parser(name, help=purpose, description=purpose)
         add(verb)
@@ -86,8 +96,15 @@ def parse(parser: Parser, words: Sequence[str]) -> argparse.Namespace:
     for rule in ("goal", "feature", "start_seed"):  # the model is then made again wherever its env_kwargs go
         if vars(arguments).get(rule) is not None:
             key = f"--{rule.replace('_', '-')}"
-            arguments.env_kwargs = {**arguments.env_kwargs, key: vars(arguments)[rule]}
+            arguments.env_kwargs = _with_rule(arguments.env_kwargs, key, vars(arguments)[rule])
     return arguments
+
+
+def _with_rule(env_kwargs: Any, key: str, rule: Any) -> Any:
+    """Return the options of an environment, or of each of several, with a rule among them."""
+    if isinstance(env_kwargs, list):
+        return [{**options, key: rule} for options in env_kwargs]
+    return {**env_kwargs, key: rule}
 
 
 def _check_options(words: Sequence[str], parser: Parser) -> None:
@@ -106,9 +123,7 @@ def _doctor(verb: Parser) -> None:
 def _plan(verb: Parser) -> None:
     """search a trajectory to the goal of an environment with a planner"""
     _add_environment(verb)
-    verb.add_argument("--planner", default="Ex", metavar="NAME", help="a registered one or module:Class (Ex)")
-    verb.add_argument("--planner-kwargs", type=json_object, default={}, metavar="JSON",
-                      help="options of the planner")
+    _add_planner(verb)
     _add_seed(verb)
     _add_budget(verb, 1_000_000)
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop after this much wall time")
@@ -121,10 +136,15 @@ def _train(verb: Parser) -> None:
     _add_environment(verb, required=False)
     verb.add_argument("--method", type=choice("method", METHODS), default="pbcs", metavar="NAME",
                       help=f"one of {', '.join(METHODS)} (pbcs)")
+    _add_planner(verb)
     verb.add_argument("--agent", default="ddpg", metavar="NAME", help="registered, or module:Class (ddpg)")
     verb.add_argument("--device", default="cpu", metavar="NAME", help="where the agent learns: cpu or cuda (cpu)")
     verb.add_argument("--preset", type=choice("preset", PRESETS), default="fast", metavar="NAME",
                       help="fast: ours; thesis: the settings of [Matheron2020] (fast)")
+    verb.add_argument("--settings", type=json_object, default={}, metavar="JSON",
+                      help="skill settings that differ from the preset, such as '{\"activation\": \"classifier\"}'")
+    verb.add_argument("--agent-settings", type=json_object, default={}, metavar="JSON",
+                      help="agent settings that differ from the preset, such as '{\"hidden\": [128, 128]}'")
     verb.add_argument("--path", metavar="DIR",
                       help="train along this plan, a folder of pbcs plan or a trajectory")
     _add_seed(verb)
@@ -141,38 +161,74 @@ def _eval(verb: Parser) -> None:
     verb.add_argument("--epsilon", type=fraction, default=0.0, metavar="E",
                       help="probability of a random action in each step (0)")
     verb.add_argument("--video", metavar="FILE", help="film the first rollout; .mp4 or .gif")
+    verb.add_argument("--out", metavar="DIR", help="new folder for the numbers, which pbcs report shows (none)")
 
 
 def _compare(verb: Parser) -> None:
     """run several planners with several seeds and tabulate what they need"""
     verb.add_argument("--planners", nargs="+", required=True, metavar="NAME",
                       help="registered planners or module:Class")
-    _add_environment(verb)
+    verb.add_argument("--planner-kwargs", type=json_object, default={}, metavar="JSON",
+                      help="options by planner, such as '{\"Ex\": {\"bin_size\": 0.2}}'")
+    _add_environment(verb, several=True)
     verb.add_argument("--seeds", type=integer(1), default=10, metavar="N", help="seeds of each planner (10)")
     _add_budget(verb, 1_000_000)
-    verb.add_argument("--jobs", type=integer(1), default=1, metavar="J",
-                      help="runs side by side (1); more than there are cores makes the seconds meaningless")
+    verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop a run after this much wall time")
+    verb.add_argument("--max-memory", type=integer(1), metavar="MB",
+                      help="kill a run whose process holds more; Python and the libraries take about 250")
+    _add_execution(verb)
     _add_out(verb)
 
 
 def _study(verb: Parser) -> None:
     """run an experiment of the studies, draw its figures and check its claims"""
+    verb.epilog = ON_A_CLUSTER
     verb.add_argument("id", nargs="?", metavar="ID", help="a study of --list, or the folder of one")
     verb.add_argument("--list", action="store_true", help="list the studies and what they are about")
     verb.add_argument("--seeds", type=integer(1), metavar="N", help="how many seeds (as the study says)")
-    verb.add_argument("--jobs", type=integer(1), default=1, metavar="J", help="runs side by side (1)")
+    verb.add_argument("--device", metavar="NAME", help="where agents learn: cpu or cuda (as the study says)")
+    verb.add_argument("--max-seconds", type=seconds, metavar="S", help="kill a run that takes longer")
+    verb.add_argument("--max-memory", type=integer(1), metavar="MB", help="kill a run whose process holds more")
+    _add_execution(verb)
+    verb.add_argument("--shard", type=part, metavar="I/N",
+                      help="make the I-th of N parts of the runs, from 1; parts may share --out at the same time")
+    verb.add_argument("--emit", type=choice("scheduler", SCHEDULERS), metavar="NAME",
+                      help="make nothing, write the runs for a scheduler into --out: make (a Makefile) or slurm")
     verb.add_argument("--out", metavar="DIR", help="folder for the results; a study that was stopped goes on there")
 
 
-def _add_environment(verb: Parser, *, required: bool = True) -> None:
-    verb.add_argument("--env", required=required, metavar="ID", help="a Gymnasium id, such as pbcs/Maze-v0")
-    verb.add_argument("--env-kwargs", type=json_object, default={}, metavar="JSON",
-                      help="options of the environment, such as '{\"size\": 5}'")
+def _report(verb: Parser) -> None:
+    """show a result folder, or all of those below one, as one HTML page"""
+    verb.add_argument("dir", metavar="DIR", help="a folder of results, or one that holds many, such as runs")
+    verb.add_argument("--out", metavar="FILE", help="the page (report.html in DIR); one that is there is replaced")
+
+
+def _add_execution(verb: Parser) -> None:
+    verb.add_argument("--jobs", type=integer(1), metavar="J",
+                      help="runs side by side (1, or all processors of a cluster); more than there are cores makes the "
+                           "seconds meaningless")
+    verb.add_argument("--executor", type=choice("executor", EXECUTORS), default="local", metavar="NAME",
+                      help="local: processes here; ray: a Ray cluster (local)")
+    verb.add_argument("--address", metavar="HOST:PORT", help="the Ray cluster (auto: the one this machine is part of)")
+
+
+def _add_environment(verb: Parser, *, required: bool = True, several: bool = False) -> None:
+    number: dict[str, Any] = {"nargs": "+"} if several else {}
+    more = "; several are paired with the ids, or one of either goes with all of the other" if several else ""
+    verb.add_argument("--env", required=required, metavar="ID", help="a Gymnasium id, such as pbcs/Maze-v0", **number)
+    verb.add_argument("--env-kwargs", type=json_object, default=[{}] if several else {}, metavar="JSON",
+                      help="options of the environment, such as '{\"size\": 5}'" + more, **number)
     verb.add_argument("--goal", metavar="RULE", help="what a success is, such as 'reward>0' or 'qpos[0]>=0.45', in "
                                                      "place of what the environment reports")
     verb.add_argument("--start-seed", type=integer(0), metavar="N",
                       help="begin every episode as reset(seed=N) does, for environments that draw start and goal")
     verb.add_argument("--feature", metavar="RULE", help="what is explored, such as 'qpos[0:2]' or 'obs[0],obs[3]'")
+
+
+def _add_planner(verb: Parser) -> None:
+    verb.add_argument("--planner", default="Ex", metavar="NAME", help="a registered one or module:Class (Ex)")
+    verb.add_argument("--planner-kwargs", type=json_object, default={}, metavar="JSON",
+                      help="options of the planner, such as '{\"hold\": 10}'")
 
 
 def _add_seed(verb: Parser) -> None:

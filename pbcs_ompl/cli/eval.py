@@ -1,10 +1,13 @@
 """`pbcs eval`: run a trained chain of skills many times from the start."""
 
 from argparse import Namespace
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from pbcs_ompl.cli.terminal import conclude, percent, short
+from pbcs_ompl.cli.terminal import conclude
+from pbcs_ompl.core.run_folder import RunFolder
+from pbcs_ompl.core.wording import percent, short
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.reset_anywhere import make
 from pbcs_ompl.skills.chain import SkillChain
@@ -19,8 +22,13 @@ def run(arguments: Namespace) -> int:
     model = make(chain.env_id, chain.env_kwargs)
     if arguments.video:
         check_video(arguments.video)
-    evaluation = evaluate(chain, model, episodes=arguments.episodes, epsilon=arguments.epsilon)
-    summary = evaluation.summary()
+    with nullcontext() if arguments.out is None else RunFolder(arguments.out) as out:
+        evaluation = evaluate(chain, model, episodes=arguments.episodes, epsilon=arguments.epsilon)
+        summary = evaluation.summary()
+        if out is not None:
+            out.write_config({"chain": folder, "env": chain.env_id, "episodes": arguments.episodes,
+                              "epsilon": arguments.epsilon, "env_kwargs": chain.env_kwargs})
+            out.write_result(summary)
     if arguments.video:
         write_video(model, chain.rollout(model, epsilon=arguments.epsilon), arguments.video)
         summary["video"] = arguments.video

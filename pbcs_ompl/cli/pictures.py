@@ -10,7 +10,7 @@ from pbcs_ompl.core.errors import PbcsError
 
 if TYPE_CHECKING:
     from pbcs_ompl.bridge.plan import PlanResult
-    from pbcs_ompl.compare.compare import Comparison
+    from pbcs_ompl.compare import Comparison
     from pbcs_ompl.skills.chain import SkillChain
 
 
@@ -45,10 +45,8 @@ def draw_chain(model: ResetAnywhere, chain: "SkillChain", trajectory: Array | No
 
 
 def draw_comparison(comparison: "Comparison", title: str, out: Path) -> None:
-    """Draw compare.png: the distribution of the transitions to the goal."""
-    from pbcs_ompl.figures.compare import compare_figure
+    """Draw compare.png, the distribution of the transitions to the goal, and coverage.png, how it grew."""
+    from pbcs_ompl.figures.compare import coverage_figure, distribution_figure
 
-    transitions: dict[str, list[float | None]] = {}
-    for run in comparison.runs:
-        transitions.setdefault(run["planner"], []).append(run["transitions"] if run["solved"] else None)
-    draw("compare.png", lambda: compare_figure(transitions, title=title), out)
+    draw("compare.png", lambda: distribution_figure(comparison.by_environment(), title=title), out)
+    draw("coverage.png", lambda: coverage_figure(comparison.by_environment(), title=title), out)

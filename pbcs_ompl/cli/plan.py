@@ -7,7 +7,8 @@ from pbcs_ompl.bridge.plan import PlanResult, plan
 from pbcs_ompl.cli.folders import environment_words, fresh_folder
 from pbcs_ompl.cli.models import note_rules
 from pbcs_ompl.cli.pictures import draw_tree
-from pbcs_ompl.cli.terminal import Report, conclude, duration, list_files, short
+from pbcs_ompl.cli.terminal import Report, conclude, list_files
+from pbcs_ompl.core.wording import duration, short
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.reset_anywhere import make
 

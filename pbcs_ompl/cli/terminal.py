@@ -3,23 +3,37 @@
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
 
 from pbcs_ompl.core.run_folder import plain
+from pbcs_ompl.core.wording import duration, short
 
 SECONDS_BETWEEN_LINES = 10.0
+
+
+class _Bar(Progress):
+    """A progress bar with a table under it."""
+
+    table: Table | None = None
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        yield from super().get_renderables()
+        if self.table is not None:
+            yield self.table
 
 
 class Report:
     """Progress of one run, shown as a live bar on a terminal and as a line now and then elsewhere.
 
     It is called with the plain numbers of a `ProgressCallback`. The time left follows from "covered", the
-    share that is done, where it is among them; else from the budgets, and a search usually ends earlier.
+    share that is done, where it is among them; else from the budgets, and a search usually ends earlier. Where there is
+    a "table", a list of dictionaries with the same keys, it is shown below.
 
     Args:
         label: What is being done.
@@ -33,7 +47,7 @@ class Report:
         self._label, self._count, self._budget, self._max_seconds = label, count, budget, max_seconds
         console = Console(stderr=True, highlight=False)
         columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
-        self._bar = Progress(*columns, console=console, transient=True) if console.is_terminal else None
+        self._bar = _Bar(*columns, console=console, transient=True) if console.is_terminal else None
 
     def __enter__(self) -> "Report":
         self._start = self._last_line = time.monotonic()
@@ -54,9 +68,12 @@ class Report:
         if self._bar is not None:
             total = None if share is None else 1.0
             self._bar.update(self._task, description=text, total=total, completed=share or 0)
+            self._bar.table = _table(numbers.get("table", []))
         elif now - self._last_line > SECONDS_BETWEEN_LINES:
             self._last_line = now
-            print(text, file=sys.stderr, flush=True)
+            rows = ("  " + ", ".join(f"{name} {short(value)}" for name, value in row.items())
+                    for row in numbers.get("table", []))
+            print(text, *rows, sep="\n", file=sys.stderr, flush=True)
 
     def _share(self, numbers: dict[str, Any], seconds: float) -> float | None:
         """Return how much is done, in [0, 1], None when nobody knows."""
@@ -68,7 +85,7 @@ class Report:
 
     def _describe(self, numbers: dict[str, Any], seconds: float, share: float | None) -> str:
         parts = [f"{name.replace('_', ' ')} {short(value)}" for name, value in numbers.items()
-                 if name not in ("seconds", "covered")]
+                 if name not in ("seconds", "covered", "table")]
         if seconds > 0 and self._count in numbers:
             parts.append(f"{short(numbers[self._count] / seconds)} {self._count}/s")
         if share:
@@ -77,25 +94,16 @@ class Report:
         return ", ".join(parts)
 
 
-def short(value: Any) -> str:
-    """Write a number for reading: thousands separated, three digits after a small point."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return str(value)
-    return f"{value:,.0f}" if isinstance(value, int) or abs(value) >= 100 else f"{value:.3g}"
-
-
-def duration(seconds: float) -> str:
-    """Write a duration for reading."""
-    if seconds < 10:
-        return f"{seconds:.2g} s"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s" if minutes else f"{rest} s"
-
-
-def percent(rate: float, wilson: Sequence[float]) -> str:
-    """Write a success rate with its 95 % Wilson interval."""
-    return f"{rate:.0%} (95 % interval {wilson[0]:.0%} to {wilson[1]:.0%})"
+def _table(rows: Sequence[dict[str, Any]]) -> Table | None:
+    """Return a table with a column for each key of the rows; None without rows."""
+    if not rows:
+        return None
+    table = Table(box=None, pad_edge=False)
+    for name, value in rows[0].items():
+        table.add_column(name, justify="left" if isinstance(value, str) else "right")
+    for row in rows:
+        table.add_row(*map(short, row.values()))
+    return table
 
 
 def conclude(result: dict[str, Any], lines: Sequence[tuple[str, str]], *, as_json: bool) -> None:

@@ -9,9 +9,10 @@ from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.cli.arguments import build_parser
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_chain
-from pbcs_ompl.cli.terminal import Report, conclude, duration, list_files, percent, short, warn
+from pbcs_ompl.cli.terminal import Report, conclude, list_files, warn
 from pbcs_ompl.core.errors import InvalidOption, TrainingStalled
 from pbcs_ompl.core.run_folder import CONFIG
+from pbcs_ompl.core.wording import duration, percent, short
 from pbcs_ompl.reset_anywhere import make
 from pbcs_ompl.skills import TrainResult, resume, train
 
@@ -46,8 +47,10 @@ def _train(arguments: Namespace, out: Path) -> TrainResult:
             return resume(out, on_progress=report, **budget)
         trajectory = None if arguments.path is None else _read_trajectory(Path(arguments.path))
         return train(arguments.env, env_kwargs=arguments.env_kwargs, trajectory=trajectory, out=out,
-                     method=arguments.method, agent=arguments.agent, preset=arguments.preset,
-                     seed=arguments.seed, device=arguments.device, on_progress=report, **budget)
+                     method=arguments.method, planner=arguments.planner, planner_kwargs=arguments.planner_kwargs,
+                     agent=arguments.agent, preset=arguments.preset, settings=arguments.settings,
+                     agent_settings=arguments.agent_settings, seed=arguments.seed, device=arguments.device,
+                     on_progress=report, **budget)
 
 
 def _refuse_other_options(arguments: Namespace) -> None:

@@ -57,6 +57,14 @@ def choice(kind: str, names: Iterable[str]) -> Callable[[str], str]:
     return read
 
 
+def part(text: str) -> tuple[int, int]:
+    """Read a part of a whole, as 2/3."""
+    index, slash, count = text.partition("/")
+    if not (slash and index.isdecimal() and count.isdecimal()):
+        raise ArgumentTypeError(f"expected a part such as 2/3, got {text!r}")
+    return int(index), int(count)
+
+
 def json_object(text: str) -> dict[str, Any]:
     """Read a JSON object."""
     try:

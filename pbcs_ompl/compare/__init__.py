@@ -1,1 +1,5 @@
-"""Planners compared: the same environment, many seeds, every run recorded."""
+"""Planners compared: the same environments, many seeds, every run recorded."""
+
+from pbcs_ompl.compare.comparison import Comparison, compare, read_comparison
+
+__all__ = ["Comparison", "compare", "read_comparison"]

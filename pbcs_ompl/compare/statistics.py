@@ -1,41 +1,45 @@
-"""One row of numbers for each planner."""
+"""One row of numbers for each planner in each environment."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from pbcs_ompl.compare.run import Record
 from pbcs_ompl.core.statistics import wilson
 
-Record = dict[str, Any]
-"""One run: planner, seed, solved, transitions, seconds, nodes, path_length, replay_ok, reason."""
+
+def censored(record: Record, max_transitions: int) -> int:
+    """Return the transitions to the goal, or the whole budget where it was not reached: a lower bound."""
+    return int(record["transitions"]) if record["solved"] else max_transitions
 
 
 def row(planner: str, records: Sequence[Record], max_transitions: int) -> dict[str, Any]:
-    """Summarise the runs of one planner.
+    """Summarise the runs of one planner in one environment.
 
     A run that did not reach the goal counts in the medians of transitions as if it had needed the whole
     budget (right-censored): with fewer than half of the runs solved the median is the budget, a lower
-    bound. Seconds are the wall time of the search, of all runs that ended by themselves.
+    bound. The other medians are those of all runs that ended by themselves, the path's of all that were solved.
 
     Returns:
-        planner; solved and runs (counts); wilson [low, high] (95 %); transitions_median,
-        transitions_quartiles, seconds_median (None where no run could be made); reason: why the first run
-        that broke did, or None.
+        planner; solved, runs, failed (counts; failed runs did not come to an end); wilson [low, high] (95 %);
+        transitions_median and transitions_quartiles; the medians of seconds (wall time of the search),
+        collision_checks, path_length and coverage, None where no run tells; reason: why the first that failed did.
     """
     solved = sum(record["solved"] for record in records)
     ran = [record for record in records if record["seconds"] is not None]
-    transitions = [record["transitions"] if record["solved"] else max_transitions for record in records]
-    broken = [record["reason"] for record in records if record["seconds"] is None]
+    transitions = [censored(record, max_transitions) for record in records]
+    reasons = [record["reason"] for record in records if record["seconds"] is None]
+    medians = {f"{name}_median": _median([record[name] for record in ran if record[name] is not None])
+               for name in ("seconds", "collision_checks", "path_length", "coverage")}
     return {
-        "planner": planner, "solved": solved, "runs": len(records),
+        "planner": planner, "solved": solved, "runs": len(records), "failed": len(reasons),
         "wilson": list(wilson(solved, len(records))),
-        "transitions_median": _quantiles(transitions, [0.5])[0] if ran else None,
-        "transitions_quartiles": _quantiles(transitions, [0.25, 0.75]) if ran else None,
-        "seconds_median": _quantiles([record["seconds"] for record in ran], [0.5])[0] if ran else None,
-        "reason": broken[0] if broken else None,
+        "transitions_median": _median(transitions) if ran else None,
+        "transitions_quartiles": np.quantile(transitions, [0.25, 0.75]).tolist() if ran else None,
+        **medians, "reason": reasons[0] if reasons else None,
     }
 
 
-def _quantiles(values: Sequence[float], levels: Sequence[float]) -> list[float]:
-    return [float(value) for value in np.quantile(values, levels)]
+def _median(values: Sequence[float]) -> float | None:
+    return float(np.median(values)) if values else None

@@ -45,6 +45,8 @@ class ResetAnywhere(Protocol):
         bin_size: Suggested edge length of exploration bins along each feature dimension [F].
         goal_threshold: A state is a success if and only if `goal_distance < goal_threshold`.
         max_episode_steps: Suggested length of an episode.
+        parallel_batch: How many states `transition` has to be given together to keep all cores busy; 1 where it does
+            not matter. It does not depend on the number of cores, so results do not either.
         walls: Rectangles [W, 4] (x0, y0, x1, y1) in the first two feature dimensions, for pictures; may be empty.
         goal_circle: Centre and radius (x, y, r) of the goal in the same plane, for pictures; None when unknown.
     """
@@ -63,6 +65,7 @@ class ResetAnywhere(Protocol):
     observation_size: int
     goal_threshold: float
     max_episode_steps: int
+    parallel_batch: int
     walls: Array
     goal_circle: tuple[float, float, float] | None
 
@@ -99,8 +102,11 @@ class ResetAnywhere(Protocol):
         ...
 
     def perturb(self, state: Array, radius: float, count: int, rng: np.random.Generator, *,
-                reject_invalid: bool = True) -> Array:
+                reject_invalid: bool = True, before: Array | None = None, counter: "Counter | None" = None) -> Array:
         """Draw `count` states [count, D] within `radius` of `state` [D]; invalid ones are drawn again.
+
+        Where that takes steps of the environment, they begin in the states `before` [N, D] that lead to `state` as
+        well, and are counted in `counter`.
 
         Raises:
             InvalidState: no valid state was found near `state`.
@@ -121,7 +127,7 @@ class VectorisedEnv(Protocol):
     """What an environment offers to be reset anywhere in the fastest way (beside being a `gymnasium.Env`).
 
     Optional attributes, each with a default: `feature_dims` (all), `bin_size` (extent / 20), `advance_towards`
-    (none), `step_one` (through `transition`), `walls` (none), `goal_circle` (none).
+    (none), `step_one` (through `transition`), `parallel_batch` (1), `walls` (none), `goal_circle` (none).
     """
 
     state_low: Array

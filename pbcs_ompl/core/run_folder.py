@@ -1,22 +1,25 @@
-"""A result folder: never overwritten silently, never half-written, used by one process at a time."""
+"""A result folder: never overwritten silently, never half-written, used by one process (or by parts of one run)."""
 
 import errno
-import fcntl
 import json
 import os
-import tempfile
 import tomllib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from secrets import token_hex
 from typing import IO, Any
 
 import numpy as np
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
+from pbcs_ompl.core.folder_lock import FolderLock
+from pbcs_ompl.core.provenance import provenance
 
 CONFIG = "config.toml"
 RESULT = "result.json"
+PROVENANCE = "provenance.json"
+LOCK = ".lock"
 
 
 class RunFolder:
@@ -25,25 +28,27 @@ class RunFolder:
     Args:
         path: The folder; it is created.
         resume: Continue in a folder that already holds a run instead of refusing it.
+        part: The name of the part of a run that this process makes; others may make other parts at the same time.
 
     Raises:
         RunFolderError: the folder holds something, is in use, or cannot be written.
     """
 
-    def __init__(self, path: str | Path, *, resume: bool = False):
+    def __init__(self, path: str | Path, *, resume: bool = False, part: str = ""):
         self.path = Path(path)
         if resume and not (self.path / CONFIG).is_file():
             raise RunFolderError(f"nothing to resume: {self.path / CONFIG} does not exist")
-        if not resume and self.path.is_dir() and any(p.name != ".lock" for p in self.path.iterdir()):
+        leftovers = (LOCK, f".{CONFIG}.")  # of a process that was killed before it began
+        if not resume and self.path.is_dir() and any(not p.name.startswith(leftovers) for p in self.path.iterdir()):
             raise RunFolderError(f"{self.path} already exists; choose another --out, or remove it first")
-        with clear_write_errors(self.path):
+        with clear_write_errors(self.path), ExitStack() as locks:
             self.path.mkdir(parents=True, exist_ok=True)
-            self._lock = open(self.path / ".lock", "w")  # noqa: SIM115 - held for the life of the run
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            self._lock.close()
-            raise RunFolderError(f"{self.path} is in use by another process; choose another --out") from error
+            locks.enter_context(FolderLock(self.path / LOCK, shared=bool(part)))
+            if part:
+                locks.enter_context(FolderLock(self.path / f"{LOCK}-{part}"))
+            self._locks = locks.pop_all()
+        if resume:
+            self._note_provenance()
 
     def __enter__(self) -> "RunFolder":
         return self
@@ -53,34 +58,55 @@ class RunFolder:
 
     def close(self) -> None:
         """Release the lock and remove its file."""
-        if not self._lock.closed:
-            (self.path / ".lock").unlink(missing_ok=True)
-            self._lock.close()
+        self._locks.close()
 
     def write_config(self, config: dict[str, Any]) -> None:
-        """Write the settings that repeat this run."""
+        """Write the settings that repeat this run, and with which versions and on which machine it is made."""
         write_text(self.path / CONFIG, to_toml(config))
+        self._note_provenance()
+
+    def _note_provenance(self) -> None:
+        """Add this process to those that worked here, unless one like it did."""
+        path = self.path / PROVENANCE
+        before = read_json(path) if path.is_file() else []
+        if provenance() not in before:
+            write_json(path, [*before, provenance()])
 
     def write_result(self, result: dict[str, Any]) -> None:
         """Write the answer as JSON."""
         write_json(self.path / RESULT, result)
 
 
-def open_run(path: Path, config: dict[str, Any]) -> RunFolder:
+def open_run(path: Path, config: dict[str, Any], *, may_change: tuple[str, ...] = (), part: str = "") -> RunFolder:
     """Open a new folder for a run with these settings, or go on in the one where the same run was stopped.
+
+    Args:
+        may_change: Settings that may differ from those of the run that was stopped; the folder keeps the new ones.
+        part: The name of the part of the run that this process makes; see `RunFolder`.
 
     Raises:
         RunFolderError: the folder holds something else or a run with other settings, is in use, or cannot be written.
     """
+    with clear_write_errors(path):
+        path.mkdir(parents=True, exist_ok=True)
+        with FolderLock(path / f"{LOCK}-opening", wait=True):  # parts that begin at the same time, one after the other
+            return _open_run(path, config, may_change, part)
+
+
+def _open_run(path: Path, config: dict[str, Any], may_change: tuple[str, ...], part: str) -> RunFolder:
     if not (path / CONFIG).is_file():
-        opened = RunFolder(path)
+        opened = RunFolder(path, part=part)
         opened.write_config(config)
         return opened
     before, now = read_toml(path / CONFIG), tomllib.loads(to_toml(config))
     different = sorted(key for key in before.keys() | now.keys() if before.get(key) != now.get(key))
+    forbidden = [key for key in different if key not in may_change]
+    if forbidden:
+        raise RunFolderError(f"{path} holds another run ({', '.join(forbidden)}); choose another --out")
+    opened = RunFolder(path, resume=True, part=part)
     if different:
-        raise RunFolderError(f"{path} holds another run ({', '.join(different)}); choose another --out")
-    return RunFolder(path, resume=True)
+        opened.write_config(config)
+    return opened
 
 
 @contextmanager
@@ -98,15 +124,15 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Write a file under a temporary name, flush it to disk, then rename it: it is whole or absent."""
     with clear_write_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        temporary = path.with_name(f".{path.name}.{token_hex(4)}")  # tempfile would hide it from all other users
         try:
-            with os.fdopen(handle, "wb") as file:
+            with open(temporary, "xb") as file:
                 write(file)
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(temporary, path)
         except BaseException:
-            Path(temporary).unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
             raise
 
 
@@ -195,7 +221,7 @@ def to_toml(config: dict[str, Any]) -> str:
 def _toml_value(value: Any) -> str:
     value = plain(value) if isinstance(value, np.ndarray | np.generic | Path) else value
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_toml_string(k)} = {_toml_value(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{_toml_string(k)} = {_toml_value(v)}" for k, v in value.items() if v is not None) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_toml_value(item) for item in value) + "]"
     if isinstance(value, float) and not np.isfinite(value):

@@ -18,6 +18,13 @@ def new_figure(width: float = 6.4, height: float = 6.4) -> tuple[Figure, Axes]:
     return figure, figure.add_subplot()
 
 
+def new_panels(rows: int, columns: int) -> tuple[Figure, list[Axes]]:
+    """Return an empty figure of rows x columns panels, and their axes row by row."""
+    figure = Figure(figsize=(7.2 if columns == 1 else 5.4 * columns, 4.6 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, list(figure.subplots(rows, columns, squeeze=False).flat)
+
+
 def save(figure: Figure, path: str | Path) -> Path:
     """Write the figure as PNG, atomically, and return its path.
 

@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 
 from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
 from pbcs_ompl.core.statistics import wilson
-from pbcs_ompl.figures.canvas import new_figure
+from pbcs_ompl.figures.canvas import RED, new_figure
 
 
-def success_figure(curves: Mapping[str, tuple[IndexArray, BoolArray]], *, title: str = "") -> Figure:
+def success_figure(curves: Mapping[str, tuple[IndexArray, BoolArray]], *, title: str = "",
+                   xlabel: str = "steps of each seed") -> Figure:
     """Draw the share of solved seeds over the steps, with 95 % Wilson intervals ([Matheron2020] Fig. 6.2).
 
     Args:
@@ -24,9 +25,11 @@ def success_figure(curves: Mapping[str, tuple[IndexArray, BoolArray]], *, title:
         (line,) = axes.plot(steps, success.mean(axis=1), linewidth=2, label=f"{name} (N = {seeds})")
         axes.fill_between(steps, low, high, color=line.get_color(), alpha=0.15, linewidth=0)
     axes.set_ylim(-0.02, 1.02)
-    axes.set_xlabel("steps of each seed")
+    axes.set_xlabel(xlabel)
     axes.set_ylabel("share of solved seeds")
-    _finish(axes, title)
+    axes.set_title(title, fontsize=10)
+    axes.grid(alpha=0.3)
+    figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
     return figure
 
 
@@ -63,6 +66,25 @@ def slices_figure(actions: Array, slices: Mapping[str, Array], chosen: Mapping[s
     if ylim is not None:
         axes.set_ylim(*ylim)
     _finish(axes, title)
+    return figure
+
+
+def critic_map_figure(states: Array, actions: Array, values: Array, chosen: Array, *, title: str = "") -> Figure:
+    """Draw Q over a line of states and one dimension of the action, and the actor's way ([Matheron2020] Fig. 6.5a).
+
+    Args:
+        states, actions: [N] and [M].
+        values: Q [N, M].
+        chosen: The actor's actions [N].
+    """
+    figure, axes = new_figure(6.4, 4.6)
+    mesh = axes.pcolormesh(states, actions, values.T, shading="nearest", cmap="viridis")
+    figure.colorbar(mesh, ax=axes, label="Q")
+    axes.plot(states, chosen, color=RED, linewidth=2, label="actor")
+    axes.set_xlabel("state")
+    axes.set_ylabel("action")
+    axes.set_title(title, fontsize=10)
+    axes.legend(frameon=False, fontsize=9, labelcolor="white")
     return figure
 
 

@@ -21,9 +21,20 @@ def stage(model: ResetAnywhere, title: str) -> tuple[Figure, Axes]:
     Raises:
         Mismatch: the feature has fewer than two dimensions, so there is no plane to draw.
     """
+    figure, axes = new_figure()
+    furnish(axes, model)
+    axes.set_title(title, fontsize=10)
+    return figure, axes
+
+
+def furnish(axes: Axes, model: ResetAnywhere) -> None:
+    """Draw the model's walls and goal into axes, at equal scale.
+
+    Raises:
+        Mismatch: as `stage`.
+    """
     if len(model.feature_low) < 2:
         raise Mismatch(f"a picture needs two feature dimensions, {model.env_id} has {len(model.feature_low)}")
-    figure, axes = new_figure()
     corners = [Rectangle((x0, y0), x1 - x0, y1 - y0) for x0, y0, x1, y1 in np.reshape(model.walls, (-1, 4))]
     axes.add_collection(PatchCollection(corners, facecolor=WALL, edgecolor="none", zorder=2))
     if model.goal_circle is not None:
@@ -31,8 +42,6 @@ def stage(model: ResetAnywhere, title: str) -> tuple[Figure, Axes]:
         axes.add_patch(Circle((x, y), radius, facecolor=GOAL, edgecolor="black", linewidth=0.6, zorder=2,
                               label="goal"))
     _frame(axes, model)
-    axes.set_title(title, fontsize=10)
-    return figure, axes
 
 
 def plane(model: ResetAnywhere, states: Array) -> Array:

@@ -66,6 +66,16 @@ def make(env_id: str, env_kwargs: dict[str, Any] | None = None, *, goal: str | G
     return model
 
 
+def is_known(env_id: str) -> bool:
+    """Return whether `make` finds an environment of this id here."""
+    load_environments()
+    try:
+        _find(env_id)
+    except (UnknownName, MissingDependency):
+        return False
+    return True
+
+
 def open_model(env: str | gymnasium.Env | ResetAnywhere, env_kwargs: dict[str, Any] | None = None) -> ResetAnywhere:
     """Return the model of what a user names as an environment: an id, an environment, or a model.
 

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray, ResetAnywhere
+from pbcs_ompl.core.contracts import Array, BoolArray, Counter, ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption, NoResetAnywhere
 from pbcs_ompl.reset_anywhere.ball import valid_in_ball
 from pbcs_ompl.reset_anywhere.rollouts import reached_in_ball
@@ -20,8 +20,9 @@ class Model:
 
     Reads the optional attributes of an environment: `feature_dims` (default: all dimensions), `bin_size`
     (extent / 20), `walls` (none), `goal_circle` (none), `max_episode_steps` (that of its spec, else 1000),
-    `advance_towards` (none), `distance(states, others)` (Euclid's), and `perturb_by_rollouts` (False): whether
-    states near a state are those that short random rollouts reach, because others may be no states at all.
+    `parallel_batch` (1), `advance_towards` (none), `distance(states, others)` (Euclid's), and `perturb_by_rollouts`
+    (False): whether states near a state are those that short random rollouts reach, because others may be no states
+    at all.
 
     Args:
         env: The environment without wrappers. One that was not made by `gymnasium.make` has no id; its
@@ -51,6 +52,7 @@ class Model:
         self.observation_size = int(env.observation_space.shape[0])
         limit = (None if spec is None else spec.max_episode_steps) or DEFAULT_EPISODE_STEPS
         self.max_episode_steps = int(getattr(env, "max_episode_steps", limit))
+        self.parallel_batch = int(getattr(env, "parallel_batch", 1))
         self.walls = np.asarray(getattr(env, "walls", np.empty((0, 4))), dtype=np.float64)
         self.goal_circle: tuple[float, float, float] | None = getattr(env, "goal_circle", None)
         self._steer = getattr(env, "advance_towards", None)
@@ -68,10 +70,14 @@ class Model:
         return np.linalg.norm(np.asarray(states) - others, axis=1)
 
     def perturb(self, state: Array, radius: float, count: int, rng: np.random.Generator, *,
-                reject_invalid: bool = True) -> Array:
-        """Draw states [count, D] around `state` [D]: uniformly from the ball, or by random rollouts that stay in it.
+                reject_invalid: bool = True, before: Array | None = None, counter: Counter | None = None) -> Array:
+        """Draw states [count, D] around `state` [D]: uniformly from the ball, or by random rollouts that end in it.
 
         Invalid states are drawn again; what a rollout reaches is valid.
+
+        Args:
+            before: States [N, D] that lead to `state`: rollouts begin there as well.
+            counter: Where the steps of rollouts are counted.
 
         Raises:
             InvalidOption: the radius is negative or not finite.
@@ -79,7 +85,7 @@ class Model:
         """
         if self._by_rollouts:
             model = cast(ResetAnywhere, self)
-            return reached_in_ball(model, np.asarray(state, dtype=np.float64), radius, count, rng)
+            return reached_in_ball(model, np.asarray(state, dtype=np.float64), radius, count, rng, before, counter)
         return valid_in_ball(state, radius, count, rng, self.is_valid if reject_invalid else None)
 
     def is_valid(self, states: Array) -> BoolArray:

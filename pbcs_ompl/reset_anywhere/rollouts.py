@@ -2,18 +2,24 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.contracts import Array, Counter, ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
 
 MAX_STEPS = 5
 MAX_ROUNDS = 50
 
 
-def reached_in_ball(model: ResetAnywhere, state: Array, radius: float, count: int, rng: np.random.Generator) -> Array:
-    """Return states [count, D] that 0 to 5 random steps from `state` [D] reach within `radius`.
+def reached_in_ball(model: ResetAnywhere, state: Array, radius: float, count: int, rng: np.random.Generator,
+                    before: Array | None = None, counter: Counter | None = None) -> Array:
+    """Return states [count, D] within `radius` of `state` [D] that 0 to 5 random steps reach from it or from `before`.
 
-    Source: [Matheron2020] 7.2.4 perturbs in a ball. Differs: a vector near the state of a simulator may have legs in
-    the floor; what the simulator itself reaches has not.
+    Source: [Matheron2020] 7.2.4 perturbs in a ball, and proposes to run the environment backwards at random within it,
+    which finds what is about to arrive at the state. Differs: a vector near the state of a simulator may have legs in
+    the floor, what the simulator itself reaches has not; and instead of backwards it runs forwards from the states
+    `before` [N, D]. From `state` alone it would only find what has passed it.
+
+    Args:
+        counter: Where the steps are counted.
 
     Raises:
         InvalidOption: the radius is negative or not finite.
@@ -21,18 +27,19 @@ def reached_in_ball(model: ResetAnywhere, state: Array, radius: float, count: in
     """
     if not (np.isfinite(radius) and radius >= 0.0):
         raise InvalidOption(f"radius={radius!r}: expected a finite number >= 0")
+    sources = state[None] if before is None else np.concatenate([before, state[None]])
     found = np.empty((0, len(state)))
     for _ in range(MAX_ROUNDS):
         if len(found) >= count:
             return found[:count]
-        reached = _roll(model, np.tile(state, (count, 1)), rng)
+        reached = _roll(model, sources[rng.integers(0, len(sources), count)], rng, counter or Counter())
         found = np.concatenate([found, reached[model.distance(reached, state) <= radius]])
     if len(found) < count:
         raise InvalidState(f"random rollouts leave the ball of radius {radius:g} around the state; take a larger one")
     return found[:count]
 
 
-def _roll(model: ResetAnywhere, states: Array, rng: np.random.Generator) -> Array:
+def _roll(model: ResetAnywhere, states: Array, rng: np.random.Generator, counter: Counter) -> Array:
     """Return what `states` [B, D] become in 0 to MAX_STEPS random steps each; ended episodes are left out."""
     steps = rng.integers(0, MAX_STEPS + 1, len(states))
     ended = np.zeros(len(states), dtype=np.bool_)
@@ -42,6 +49,7 @@ def _roll(model: ResetAnywhere, states: Array, rng: np.random.Generator) -> Arra
             break
         controls = rng.uniform(model.action_low, model.action_high, (len(moving), len(model.action_low)))
         outcome = model.transition(states[moving], controls)
+        counter.count += len(moving)
         states[moving] = outcome.states
         ended[moving] = outcome.terminated
     return states[~ended]

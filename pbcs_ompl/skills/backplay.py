@@ -22,6 +22,7 @@ class BackplayState:
         phase: What the next step does.
         best, misses: Highest success rate of a session here, and the sessions since then without a higher one.
         sessions: Training sessions of this skill so far.
+        anew: Whether it has been begun anew with fresh networks, having no start point yet.
     """
 
     start: int
@@ -31,6 +32,7 @@ class BackplayState:
     best: float = -1.0
     misses: int = 0
     sessions: int = 0
+    anew: bool = False
 
 
 class Backplay:
@@ -43,8 +45,9 @@ class Backplay:
     Source: [Matheron2020] Alg. 7. Differs: index 0 is trained too; once a session succeeds, a test may end the
     training loop before alpha sessions without improvement (`stop_at_success`); the stride between start points
     doubles while tests pass and halves when they fail (`min_stride = max_stride = 1` is the thesis); a start point
-    that stays partly solved ends the skill unless `keep_partial`; then, too, a skill that has no start point yet begins
-    anew with fresh networks.
+    that stays partly solved ends the skill unless `keep_partial`; a skill that has no start point yet begins anew with
+    fresh networks, and if this does not help passes over such start points, as Alg. 7 does. A ball can hold states from
+    which there is no short way to a goal nearby, such as those of a car that has passed it and is too slow to return.
     """
 
     def __init__(self, learner: Learner, floor: int = 0):
@@ -98,17 +101,23 @@ class Backplay:
 
     def _give_up(self, success: float) -> None:
         """Training here has stabilised below 100 %."""
-        state = self.state
-        if self.saved_policy is not None and (success == 0.0 or not self.settings.keep_partial):
+        state, begun = self.state, self.saved_policy is not None
+        if begun and (success == 0.0 or not self.settings.keep_partial):
             self.done = True
-        elif not self.settings.keep_partial:
-            self.learner.restart()
-            state.start = self._first_start()
-            self._train_from_here()
-        elif success == 0.0 or (state.start == self.floor and self.saved_policy is None):
+        elif success > 0.0 and (begun or state.start > self.floor) and (self.settings.keep_partial or state.anew):
+            self._move_on()
+        elif self.settings.keep_partial:
             self._train_from_here()
         else:
-            self._move_on()
+            self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        """Forget everything; the first start point is tried again, and only then start points are passed over."""
+        state = self.state
+        state.anew = not state.anew
+        self.learner.restart()
+        state.start = self._first_start()
+        self._train_from_here()
 
     def _first_start(self) -> int:
         return max(self.floor, self.learner.goal_index - self.settings.min_stride)

@@ -10,12 +10,13 @@ from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray, ResetAnywhere
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
 from pbcs_ompl.core.run_folder import read_arrays, read_json, write_arrays, write_json
 from pbcs_ompl.skills.episodes import with_random_actions
-from pbcs_ompl.skills.goals import Ball, Goal, Target
+from pbcs_ompl.skills.goals import ActivationSet, Goal
 from pbcs_ompl.skills.milestones import Milestones
 from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
+from pbcs_ompl.skills.set_arrays import from_arrays, kind_of, to_arrays
 
 FORMAT = "pbcs_ompl skill chain"
-VERSION = 1
+VERSION = 2
 PATIENCE = 2
 """An execution may take this many times the steps that the skills were trained for."""
 
@@ -25,7 +26,7 @@ class Skill:
     """A policy, the set of states in which it may start, and where it leads."""
 
     policy: SkillPolicy
-    activation: Ball
+    activation: ActivationSet
     goal: Goal
 
 
@@ -112,16 +113,17 @@ class SkillChain:
         return self.rollouts(model, first[None], epsilon=epsilon, rng=rng, max_steps=max_steps).states
 
     def save(self, folder: str | Path) -> None:
-        """Write chain.json (structure), chain.npz (centres) and chain.safetensors (networks)."""
+        """Write chain.json (structure), chain.npz (activation sets and goals) and chain.safetensors (policies)."""
         folder = Path(folder)
         save_policies(folder / "chain.safetensors", [skill.policy for skill in self.skills])
-        write_arrays(folder / "chain.npz", centers=np.array([s.activation.center for s in self.skills]),
-                     goals=np.array([_goal_center(s.goal, s.activation) for s in self.skills]), start=self.start)
+        arrays = {"start": self.start}
+        for index, skill in enumerate(self.skills):
+            arrays |= to_arrays(skill.activation, f"activation{index}") | to_arrays(skill.goal, f"goal{index}")
+        write_arrays(folder / "chain.npz", **arrays)
         write_json(folder / "chain.json", {
             "format": FORMAT, "version": VERSION, "env_id": self.env_id, "env_kwargs": self.env_kwargs,
             "time_limit": self.time_limit,
-            "skills": [{"radius": s.activation.radius, "goal_radius": s.goal.radius,
-                        "goal": "target" if isinstance(s.goal, Target) else "ball"} for s in self.skills]})
+            "skills": [{"activation": kind_of(s.activation), "goal": kind_of(s.goal)} for s in self.skills]})
 
     @classmethod
     def load(cls, folder: str | Path) -> "SkillChain":
@@ -140,9 +142,9 @@ class SkillChain:
         policies = load_policies(folder / "chain.safetensors", len(structure["skills"]))
         try:
             skills = tuple(
-                Skill(policy, Ball(center, entry["radius"]), _goal(entry, goal))
-                for policy, center, goal, entry in zip(policies, arrays["centers"], arrays["goals"],
-                                                       structure["skills"], strict=True))
+                Skill(policy, from_arrays(entry["activation"], arrays, f"activation{index}"),
+                      from_arrays(entry["goal"], arrays, f"goal{index}"))
+                for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
             return cls(skills, arrays["start"], structure["env_id"], structure["env_kwargs"], structure["time_limit"])
         except (KeyError, ValueError) as error:
             raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error
@@ -174,13 +176,3 @@ class ChainController:
             mine = current == index
             controls[mine] = self.chain.skills[index].policy.act(observations[mine])
         return controls
-
-
-def _goal_center(goal: Goal, activation: Ball) -> Array:
-    return goal.center if isinstance(goal, Ball) else np.full_like(activation.center, np.nan)
-
-
-def _goal(entry: dict[str, Any], center: Array) -> Goal:
-    if entry["goal"] == "target":
-        return Target(entry["goal_radius"])
-    return Ball(center, entry["goal_radius"])

@@ -9,7 +9,7 @@ from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.run_folder import plain, read_arrays, write_arrays
 from pbcs_ompl.skills.method import Snapshot
 
-VERSION = 1
+VERSION = 2
 
 
 def write_checkpoint(path: Path, snapshot: Snapshot, seconds: float) -> None:

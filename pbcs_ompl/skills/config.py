@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pbcs_ompl.agents.update import choose_device
+from pbcs_ompl.bridge.building import PlannerSpec
 from pbcs_ompl.core.contracts import ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption, UnknownName
 from pbcs_ompl.skills.agent_door import Agent, load_agent
@@ -25,6 +26,8 @@ class TrainConfig:
 
     Attributes:
         method: "pbcs", "pb", "backplay", "plain", "bootstrapped" or "offline".
+        planner: What makes the plan: a registered planner, or module:Class.
+        planner_kwargs: Options of the planner.
         agent: A registered agent, or module:Class.
         preset: Named settings of the skills and of the agent.
         settings: Skill settings that differ from the preset.
@@ -34,11 +37,14 @@ class TrainConfig:
         device: Where the agent learns, "cpu" or "cuda".
 
     Raises:
-        UnknownName: no such method, agent or preset.
-        InvalidOption: a setting that does not exist, or a value out of its range.
+        UnknownName: no such method, planner, agent or preset.
+        InvalidOption: a setting or an option that does not exist, a value out of its range, or a planner for a method
+            that makes no plan.
     """
 
     method: str = "pbcs"
+    planner: str = "Ex"
+    planner_kwargs: dict[str, Any] = field(default_factory=dict)
     agent: str = "ddpg"
     preset: str = "fast"
     settings: dict[str, Any] = field(default_factory=dict)
@@ -52,9 +58,18 @@ class TrainConfig:
             raise UnknownName("method", self.method, METHODS)
         if self.max_transitions < 1:
             raise InvalidOption(f"max_transitions = {self.max_transitions}, expected at least 1")
+        if self.chooses_planner and self.method in WITHOUT_PLAN:
+            raise InvalidOption(f"method {self.method!r} trains without a plan; remove planner and planner_kwargs, or "
+                                f"choose from {', '.join(METHODS.keys() - WITHOUT_PLAN)}")
+        PlannerSpec(self.planner, self.planner_kwargs)
         self.skill_settings()
         self._agent_settings()
         choose_device(self.device)
+
+    @property
+    def chooses_planner(self) -> bool:
+        """Whether the planner is another than Ex as it is."""
+        return self.planner != "Ex" or bool(self.planner_kwargs)
 
     def skill_settings(self) -> SkillSettings:
         """Return the preset's skill settings with this run's changes."""

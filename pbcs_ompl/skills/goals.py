@@ -23,6 +23,15 @@ class Goal(Protocol):
         ...
 
 
+class ActivationSet(Goal, Protocol):
+    """A set of states in which a skill may start: a `Ball` or a `ClassifierSet`. The skill before aims at it."""
+
+    @property
+    def center(self) -> Array:
+        """The state in its middle [D]."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class Ball:
     """The closed ball B_radius(center) by the environment's distance; [Matheron2020] section 7.2."""

@@ -8,10 +8,14 @@ import numpy as np
 from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere
 from pbcs_ompl.skills.agent_door import Agent
 from pbcs_ompl.skills.chain import Skill
+from pbcs_ompl.skills.classifier_set import learn_set
 from pbcs_ompl.skills.episodes import Act, Episodes, run_episodes
-from pbcs_ompl.skills.goals import Goal
+from pbcs_ompl.skills.goals import ActivationSet, Goal
 from pbcs_ompl.skills.milestones import Milestones
 from pbcs_ompl.skills.policy import Frame, SkillPolicy
+
+SAMPLES = 400
+"""Episodes from which a classifier learns where a skill may start."""
 
 
 class Learner:
@@ -38,15 +42,15 @@ class Learner:
         self.agent = make_agent(self.agent_seed)
         self.aim(milestones.last)
 
-    def aim(self, goal_index: int) -> None:
-        """Work towards the milestone `goal_index` from now on."""
+    def aim(self, goal_index: int, goal: Goal | None = None) -> None:
+        """Work towards the milestone `goal_index` from now on: its ball, the target at the end, or `goal` around it."""
         self.goal_index = goal_index
-        self.goal: Goal = self.milestones.goal(goal_index)
+        self.goal: Goal = self.milestones.goal(goal_index) if goal is None else goal
         self.frame: Frame = self.milestones.frame(goal_index)
 
-    def begin(self, goal_index: int) -> None:
+    def begin(self, goal_index: int, goal: Goal | None = None) -> None:
         """Start a new skill that ends at `goal_index`: no replay and, without `warm_start`, new networks."""
-        self.aim(goal_index)
+        self.aim(goal_index, goal)
         self.agent.forget()
         if not self.settings.warm_start and self.agent.num_updates:
             self.restart()
@@ -72,7 +76,7 @@ class Learner:
 
     def test(self, index: int) -> float:
         """Return the share of beta episodes from the ball of milestone `index` that reach the goal."""
-        starts = self.milestones.starts(np.full(self.settings.beta, index), self.rng)
+        starts = self.milestones.starts(np.full(self.settings.beta, index), self.rng, self.counter)
         return self._run(self.act, starts, self.settings.test_epsilon).success_rate
 
     def session(self, index: int) -> float:
@@ -90,7 +94,8 @@ class Learner:
         """Train on one episode from the ball of each milestone in `indices`; return the share that arrived."""
         reached = 0.0
         for first in range(0, len(indices), self.settings.episodes_together):
-            starts = self.milestones.starts(indices[first:first + self.settings.episodes_together], self.rng)
+            group = indices[first:first + self.settings.episodes_together]
+            starts = self.milestones.starts(group, self.rng, self.counter)
             episodes = self._run(self.explore, starts, self.settings.epsilon)
             self._remember(episodes)
             self._train(episodes.transitions)
@@ -100,6 +105,20 @@ class Learner:
     def skill(self, start_index: int, policy: SkillPolicy) -> Skill:
         """Return `policy` as a skill that starts around `start_index` and leads to the present goal."""
         return Skill(policy, self.milestones.ball(start_index), self.goal)
+
+    def activation(self, start_index: int, policy: SkillPolicy) -> ActivationSet:
+        """Return where `policy` may start: the ball of `start_index`, or what is learnt by trying it around there.
+
+        Nothing is learnt for the first skill of a chain, which is never switched to.
+        """
+        ball = self.milestones.ball(start_index)
+        if self.settings.activation == "ball" or start_index == 0:
+            return ball
+        around = self.rng.choice(self.milestones.near(start_index), SAMPLES)
+        starts = self.milestones.starts(around, self.rng, self.counter)
+        episodes = self._run(lambda states: policy.act(self.model.observe(states)), starts, self.settings.test_epsilon)
+        return learn_set(self.model.observe(starts), episodes.reached, ball.center, ball.radius,
+                         int(self.rng.integers(2**31)))
 
     def policy(self) -> SkillPolicy:
         """Return a snapshot of the agent's policy in the present frame."""

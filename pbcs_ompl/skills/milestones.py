@@ -4,11 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere
 from pbcs_ompl.skills.goals import Ball, Goal, Target
 from pbcs_ompl.skills.policy import Frame
 from pbcs_ompl.skills.settings import SkillSettings
 from pbcs_ompl.skills.shorten import shorten
+
+BEFORE = 5
+"""Milestones before a start point from which random rollouts may arrive in its ball."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,17 +50,22 @@ class Milestones:
             return Target(self.model.goal_threshold)
         return self.ball(index)
 
+    def near(self, index: int) -> IndexArray:
+        """Return the milestones whose states lie in the ball of `index`, itself among them."""
+        return np.flatnonzero(self.ball(index).contains(self.model, self.states))
+
     def frame(self, index: int) -> Frame:
         """Return the frame of observations for a skill that ends at `index`."""
         if not self.settings.relative_observations:
             return Frame.plain(self.model.observation_size)
         return Frame.around(self.model.observe(self.states[index:index + 1])[0], self.model.observe(self.states))
 
-    def starts(self, indices: np.ndarray, rng: np.random.Generator) -> Array:
-        """Draw one start state [D] in the ball of each index [B]."""
+    def starts(self, indices: np.ndarray, rng: np.random.Generator, counter: Counter | None = None) -> Array:
+        """Draw one start state [D] in the ball of each index [B]; count the steps that this takes, if any."""
         draws = np.empty((len(indices), self.states.shape[1]))
         for index in np.unique(indices):
             mine = indices == index
             draws[mine] = self.model.perturb(self.states[index], self.settings.radius, int(mine.sum()), rng,
-                                             reject_invalid=self.settings.reject_invalid)
+                                             reject_invalid=self.settings.reject_invalid,
+                                             before=self.states[max(0, index - BEFORE):index], counter=counter)
         return draws

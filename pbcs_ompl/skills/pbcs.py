@@ -6,9 +6,11 @@ import numpy as np
 
 from pbcs_ompl.skills.backplay import Backplay
 from pbcs_ompl.skills.chain import Skill, SkillChain
+from pbcs_ompl.skills.goals import ActivationSet, Goal
 from pbcs_ompl.skills.learner import Learner
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.policy import SkillPolicy, policy_from_arrays, policy_to_arrays
+from pbcs_ompl.skills.set_arrays import from_arrays, kind_of, to_arrays
 
 VERIFIED_RATE = 0.985
 """Share of noisy executions that must arrive for a chain to be taken as it is.
@@ -23,6 +25,7 @@ class Link(NamedTuple):
     start: int
     goal: int
     policy: SkillPolicy
+    activation: ActivationSet
 
 
 class PBCS:
@@ -32,9 +35,9 @@ class PBCS:
     K, and so on until one starts at milestone 0.
 
     Source: [Matheron2020] Alg. 6. Differs: the loop ends when a skill starts at index 0 (Alg. 7 never trains index 0,
-    so that Alg. 6 would not end). With `verify_episodes`, the complete chain is executed that many times with random
-    actions, and once without; when too many executions fail, the skill in which most of them got stuck is taken out
-    and the gap is learnt anew with fresh networks.
+    so that Alg. 6 would not end). With `verify_episodes`, the complete chain is executed once without random actions
+    and, if it arrives, that many times with them; when it does not, or too many executions fail, the skill in which
+    most of them got stuck is taken out and the gap is learnt anew with fresh networks.
     """
 
     def __init__(self, learner: Learner):
@@ -57,8 +60,7 @@ class PBCS:
     @property
     def skills(self) -> list[Skill]:
         """The skills so far, in the order of execution."""
-        milestones = self.learner.milestones
-        return [Skill(link.policy, milestones.ball(link.start), milestones.goal(link.goal)) for link in self.links]
+        return [Skill(link.policy, link.activation, self._goal_at(link.goal)) for link in self.links]
 
     @property
     def covered(self) -> float:
@@ -74,7 +76,8 @@ class PBCS:
         self.backplay.step()
         if self.backplay.done and self.backplay.saved_policy is not None:
             start = self.backplay.state.saved
-            self.links.append(Link(start, self.goal, self.backplay.saved_policy))
+            activation = self.learner.activation(start, self.backplay.saved_policy)
+            self.links.append(Link(start, self.goal, self.backplay.saved_policy, activation))
             self.links.sort(key=lambda link: link.start)
             self._begin(start, self.floor)
 
@@ -82,20 +85,26 @@ class PBCS:
         """Learn the way from milestone `floor` to milestone `goal`, unless there is nothing left of it."""
         self.goal, self.floor = goal, floor
         if not self.complete:
-            self.learner.begin(goal)
+            self.learner.begin(goal, self._goal_at(goal))
         self.backplay = Backplay(self.learner, floor)
+
+    def _goal_at(self, index: int) -> Goal:
+        """Return what a skill that ends at milestone `index` aims at: the activation set of the skill from there on."""
+        sets: dict[int, Goal] = {link.start: link.activation for link in self.links}
+        return sets.get(index, self.learner.milestones.goal(index))
 
     def _verify(self) -> None:
         learner = self.learner
         chain = SkillChain.of(self.skills, learner.milestones)
         starts = np.repeat(learner.milestones.states[:1], learner.settings.verify_episodes, axis=0)
-        nominal = chain.rollouts(learner.model, starts[:1])
-        noisy = chain.rollouts(learner.model, starts, epsilon=learner.settings.epsilon, rng=learner.rng)
-        learner.counter.count += int(nominal.steps.sum() + noisy.steps.sum())
-        self.verified = bool(nominal.success.all() and noisy.success.mean() >= VERIFIED_RATE)
+        tried = chain.rollouts(learner.model, starts[:1])
+        learner.counter.count += int(tried.steps.sum())
+        if tried.success.all():
+            tried = chain.rollouts(learner.model, starts, epsilon=learner.settings.epsilon, rng=learner.rng)
+            learner.counter.count += int(tried.steps.sum())
+        self.verified = bool(tried.success.mean() >= VERIFIED_RATE)
         if not self.verified:
-            stuck = nominal.skills[~nominal.success] if not nominal.success.all() else noisy.skills[~noisy.success]
-            weakest = self.links.pop(int(np.bincount(stuck).argmax()))
+            weakest = self.links.pop(int(np.bincount(tried.skills[~tried.success]).argmax()))
             learner.restart()
             self._begin(weakest.goal, weakest.start)
 
@@ -106,7 +115,10 @@ class PBCS:
         policies = [link.policy for link in self.links] + ([saved] if saved else [])
         for index, policy in enumerate(policies):
             arrays |= {f"policy{index}.{name}": array for name, array in policy_to_arrays(policy).items()}
-        return Snapshot({"learner": plain, "links": [[link.start, link.goal] for link in self.links],
+        for index, link in enumerate(self.links):
+            arrays |= to_arrays(link.activation, f"activation{index}")
+        return Snapshot({"learner": plain,
+                         "links": [[link.start, link.goal, kind_of(link.activation)] for link in self.links],
                          "goal": self.goal, "floor": self.floor, "verified": self.verified,
                          "backplay": self.backplay.to_dict(), "policies": len(policies)}, arrays)
 
@@ -116,11 +128,12 @@ class PBCS:
         policies = [policy_from_arrays({name.partition(".")[2]: array for name, array in snapshot.arrays.items()
                                         if name.startswith(f"policy{index}.")})
                     for index in range(plain["policies"])]
-        self.links = [Link(start, goal, policy)
-                      for (start, goal), policy in zip(plain["links"], policies, strict=False)]
+        self.links = [Link(start, goal, policies[index], from_arrays(kind, snapshot.arrays, f"activation{index}"))
+                      for index, (start, goal, kind) in enumerate(plain["links"])]
         self.goal, self.floor, self.verified = plain["goal"], plain["floor"], plain["verified"]
         self.learner.restore(plain["learner"], {name: array for name, array in snapshot.arrays.items()
-                                                if not name.startswith("policy")})
+                                                if not name.startswith(("policy", "activation"))})
+        self.learner.aim(self.learner.goal_index, self._goal_at(self.learner.goal_index))
         self.backplay = Backplay(self.learner, self.floor)
         self.backplay.restore(plain["backplay"],
                               policies[len(self.links)] if len(policies) > len(self.links) else None)

@@ -8,6 +8,8 @@ from typing import Any
 
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
+ACTIVATIONS = ("ball", "classifier")
+
 
 @dataclass(frozen=True)
 class SkillSettings:
@@ -17,6 +19,8 @@ class SkillSettings:
         alpha: Sessions without improvement after which training has stabilised (Alg. 7).
         beta: Episodes of a session and of a test (Alg. 7 and 8).
         radius: Radius of start balls, activation sets and local goals: the thesis's epsilon of section 7.2.
+        activation: "ball", or "classifier": the activation set of a finished skill is learnt from what came of it in
+            states around its start.
         epsilon: Share of random actions while collecting experience.
         test_epsilon: Share of random actions in tests; 0 in the thesis.
         max_steps: Longest episode of a skill.
@@ -42,6 +46,7 @@ class SkillSettings:
     alpha: int = 10
     beta: int = 50
     radius: float = 0.1
+    activation: str = "ball"
     epsilon: float = 0.1
     test_epsilon: float = 0.0
     max_steps: int = 50
@@ -67,6 +72,7 @@ class SkillSettings:
         for name in ("alpha", "beta", "max_steps", "episodes_together", "min_stride", "max_stride",
                      "window_sessions", "explored"):
             self._require(name, getattr(self, name) >= 1, "at least 1")
+        self._require("activation", self.activation in ACTIVATIONS, f"one of {', '.join(ACTIVATIONS)}")
         self._require("verify_episodes", self.verify_episodes >= 0, "at least 0")
         for name in ("epsilon", "test_epsilon", "rehearsal"):
             self._require(name, 0 <= getattr(self, name) <= 1, "within [0, 1]")

@@ -7,7 +7,7 @@ import gymnasium
 
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.contracts import ProgressCallback, ResetAnywhere
-from pbcs_ompl.core.errors import DamagedFile, RunFolderError, TrainingStalled, UnknownName
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, RunFolderError, TrainingStalled, UnknownName
 from pbcs_ompl.core.run_folder import CONFIG, RESULT, RunFolder, read_toml
 from pbcs_ompl.reset_anywhere import make, open_model
 from pbcs_ompl.skills.config import TrainConfig
@@ -18,7 +18,7 @@ from pbcs_ompl.skills.training import CHECKPOINT, Training
 def train(env: str | gymnasium.Env | ResetAnywhere, *, env_kwargs: dict[str, Any] | None = None,
           trajectory: Trajectory | None = None, out: str | Path | None = None,
           on_progress: ProgressCallback | None = None, **options: Any) -> TrainResult:
-    """Plan with Ex (unless a trajectory is given) and train skills along the plan.
+    """Plan (unless a trajectory is given) and train skills along the plan.
 
     Args:
         env: A Gymnasium id, an environment, or an adapter of one.
@@ -26,10 +26,12 @@ def train(env: str | gymnasium.Env | ResetAnywhere, *, env_kwargs: dict[str, Any
         trajectory: A plan made before.
         out: A new folder for config.toml, result.json, trajectory.npz, chain/ and, until the end, checkpoint.npz.
         on_progress: Called after every session and test with plain numbers.
-        options: The fields of `TrainConfig`: method, agent, preset, settings, agent_settings, seed, max_transitions.
+        options: The fields of `TrainConfig`: method, planner, planner_kwargs, agent, preset, settings, agent_settings,
+            seed, max_transitions, device.
 
     Raises:
-        UnknownName, InvalidOption: no such method, agent, preset or setting; values out of range.
+        UnknownName, InvalidOption: no such method, planner, agent, preset or setting; values out of range; a planner
+            beside a trajectory.
         NoResetAnywhere, UnsupportedSpace: the environment does not fit.
         Mismatch: the trajectory belongs to another environment, or does not reach its goal.
         RunFolderError: the folder exists, is in use, or cannot be written.
@@ -39,6 +41,8 @@ def train(env: str | gymnasium.Env | ResetAnywhere, *, env_kwargs: dict[str, Any
     config = _config(options)
     model = open_model(env, env_kwargs)
     if trajectory is not None:
+        if config.chooses_planner:
+            raise InvalidOption("a trajectory is given, so nothing is planned; remove planner and planner_kwargs")
         trajectory.check_belongs_to(model)
     if out is None:
         return _checked(Training(model, config, None, on_progress, False).run(trajectory))
@@ -61,13 +65,14 @@ def resume(folder: str | Path, *, max_transitions: int | None = None,
     with RunFolder(folder, resume=True) as opened:
         if (opened.path / RESULT).is_file() and not (opened.path / CHECKPOINT).is_file():
             raise RunFolderError(f"the training in {opened.path} has ended; there is nothing to resume")
-        values = read_toml(opened.path / CONFIG)
+        values = read_toml(opened.path / CONFIG) | ({"max_transitions": max_transitions} if max_transitions else {})
         try:
-            env, env_kwargs = values.pop("env"), values.pop("env_kwargs", {})
-            values.pop("versions", None)
-            config = TrainConfig(**values | ({"max_transitions": max_transitions} if max_transitions else {}))
+            others = {name: values[name] for name in values.keys() - {"env", "env_kwargs", "versions"}}
+            env, env_kwargs, config = values["env"], values.get("env_kwargs", {}), TrainConfig(**others)
         except (KeyError, TypeError) as error:
             raise DamagedFile(f"{opened.path / CONFIG} is not the configuration of a training: {error}") from error
+        if max_transitions:
+            opened.write_config(values)
         return _checked(Training(make(env, env_kwargs), config, opened, on_progress, True).run(None))
 
 

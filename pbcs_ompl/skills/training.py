@@ -71,9 +71,9 @@ class Training:
         config = self.config
         if self.folder and not self.resumed:
             self.folder.write_config({
-                "env": self.model.env_id, "method": config.method, "agent": config.agent, "preset": config.preset,
-                "seed": config.seed, "max_transitions": config.max_transitions, "device": config.device,
-                "env_kwargs": self.model.env_kwargs,
+                "env": self.model.env_id, "method": config.method, "planner": config.planner, "agent": config.agent,
+                "preset": config.preset, "seed": config.seed, "max_transitions": config.max_transitions,
+                "device": config.device, "env_kwargs": self.model.env_kwargs, "planner_kwargs": config.planner_kwargs,
                 "settings": config.settings, "agent_settings": config.agent_settings,
                 "versions": planning_versions() | {"torch": version("torch")}})
 
@@ -87,8 +87,9 @@ class Training:
             return trajectory, read_json(self.path / PLAN)["transitions"]
         transitions = 0
         if trajectory is None:
-            found = plan(self.model, "Ex", seed=self.seeds.child("plan").integer(),
-                         max_transitions=self.config.max_transitions, on_progress=self._planning)
+            found = plan(self.model, self.config.planner, planner_kwargs=self.config.planner_kwargs,
+                         seed=self.seeds.child("plan").integer(), max_transitions=self.config.max_transitions,
+                         on_progress=self._planning)
             trajectory, transitions = found.trajectory, found.transitions
         elif self.model.goal_distance(trajectory.states[-1:])[0] >= self.model.goal_threshold:
             raise Mismatch("the trajectory does not end in the environment's goal")

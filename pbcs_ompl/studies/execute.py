@@ -1,33 +1,18 @@
-"""Run a study: every run in a process of its own, one file for each record, then the analysis."""
+"""Run a study: the runs that are not there yet, then the analysis; or a part of the runs."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from pbcs_ompl.compare.pool import run_all
 from pbcs_ompl.core.contracts import ProgressCallback
 from pbcs_ompl.core.errors import InvalidOption, PbcsError
-from pbcs_ompl.core.run_folder import open_run, read_json, write_json
+from pbcs_ompl.core.run_folder import RunFolder, open_run
+from pbcs_ompl.execution import Executor, Shard, check_resources
 from pbcs_ompl.studies.claims import Claim
-from pbcs_ompl.studies.study import Record, Settings, Study, find_study
+from pbcs_ompl.studies.runs import Made, make_runs, run_settings
+from pbcs_ompl.studies.study import Record, Study
 
-RUNS, FIGURES = "runs", "figures"
-
-
-class Job(NamedTuple):
-    """One run, as another process is told of it."""
-
-    study: str
-    settings: Settings
-
-
-class Outcome(NamedTuple):
-    """What came of a run: a record, or the reason why there is none."""
-
-    name: str
-    record: Record | None
-    reason: str
+FIGURES = "figures"
 
 
 @dataclass(frozen=True)
@@ -56,7 +41,8 @@ class StudyResult:
                 "figures": self.figures, "agrees": [claim.to_dict() for claim in self.agrees]}
 
 
-def run_study(study: Study, *, out: str | Path, seeds: int | None = None, jobs: int = 1,
+def run_study(study: Study, *, out: str | Path, seeds: int | None = None, jobs: int | Executor = 1,
+              max_seconds: float | None = None, max_memory: float | None = None,
               on_progress: ProgressCallback | None = None) -> StudyResult:
     """Make the runs of a study that are not there yet, and analyse all of them.
 
@@ -66,70 +52,56 @@ def run_study(study: Study, *, out: str | Path, seeds: int | None = None, jobs: 
     Args:
         out: The folder for config.toml, result.json, runs/<name>.json and figures/.
         seeds: How many seeds; as the study says by default.
-        jobs: How many processes work at a time.
+        jobs: How many processes work at a time, or what executes the runs elsewhere: see `execution.ray.ray_cluster`.
+        max_seconds, max_memory: Wall time and MB of memory of one run, which is killed when it exceeds them.
         on_progress: Called with {"runs", "failed"} when a run ends.
 
     Raises:
-        InvalidOption: fewer than one seed or job.
+        InvalidOption: fewer than one seed or job, a limit that is not positive.
         RunFolderError: `out` holds something else, is in use, or cannot be written.
         DamagedFile: a record in `out` is damaged.
         PbcsError: two runs of one name, or no run came to an end.
     """
-    seeds = study.seeds if seeds is None else seeds
-    if seeds < 1 or jobs < 1:
-        raise InvalidOption(f"seeds={seeds}, jobs={jobs}: expected at least 1 of each")
-    settings = study.runs(study.sweep, seeds)
-    _check_names(settings)
-    with open_run(Path(out), {"study": study.id, **study.sweep}) as folder:
-        records, failed = _records(study, settings, jobs, folder.path, on_progress)
+    check_resources(jobs, max_seconds, max_memory)
+    settings = run_settings(study, _seeds(study, seeds))
+    with open_study(study, out, seeds) as folder:
+        records, failed = make_runs(study, settings, folder.path, jobs=jobs, max_seconds=max_seconds,
+                                    max_memory=max_memory, on_progress=on_progress)
         if not records:
             name, reason = next(iter(failed.items()))
             raise PbcsError(f"no run of {study.id} came to an end; {name}: {reason}")
         figures = folder.path / FIGURES
         figures.mkdir(exist_ok=True)
-        claims = study.analyse(records, figures)
-        result = StudyResult(study.id, records, failed, str(folder.path),
+        claims = study.analyse(list(records.values()), figures)
+        result = StudyResult(study.id, list(records.values()), failed, str(folder.path),
                              [str(path) for path in sorted(figures.glob("*.png"))], claims)
         folder.write_result(result.summary())
     return result
 
 
-def _records(study: Study, settings: Sequence[Settings], workers: int, folder: Path,
-             on_progress: ProgressCallback | None) -> tuple[list[Record], dict[str, str]]:
-    files = {one["name"]: folder / RUNS / f"{one['name']}.json" for one in settings}
-    records: dict[str, Record] = {name: read_json(file) for name, file in files.items() if file.is_file()}
-    failed: dict[str, str] = {}
-    _report(records, failed, on_progress)
-    missing = [Job(str(study.folder.resolve()), one) for one in settings if one["name"] not in records]
-    for name, record, reason in run_all(missing, workers, _run, _failure):
-        if record is None:
-            failed[name] = reason
-        else:
-            write_json(files[name], record)
-            records[name] = read_json(files[name])
-        _report(records, failed, on_progress)
-    return [records[name] for name in files if name in records], failed
+def run_shard(study: Study, shard: Shard, *, out: str | Path, seeds: int | None = None, jobs: int | Executor = 1,
+              max_seconds: float | None = None, max_memory: float | None = None,
+              on_progress: ProgressCallback | None = None) -> Made:
+    """Make the runs of one shard; the other arguments and errors are those of `run_study`.
+
+    Other shards of the same number may work in the same folder at the same time, from this or other machines that see
+    the same disk. `run_study` then finds nothing left but to analyse.
+    """
+    check_resources(jobs, max_seconds, max_memory)
+    settings = shard.of(run_settings(study, _seeds(study, seeds)))
+    with open_study(study, out, seeds, part=f"{shard.index}-of-{shard.count}") as folder:
+        return make_runs(study, settings, folder.path, jobs=jobs, max_seconds=max_seconds, max_memory=max_memory,
+                         on_progress=on_progress)
 
 
-def _run(job: Job) -> Outcome:
-    """Make one run, in a process that may have made others."""
-    study = find_study(job.study)
-    try:
-        return Outcome(job.settings["name"], study.run(job.settings), "")
-    except PbcsError as error:
-        return _failure(job, str(error))
+def open_study(study: Study, out: str | Path, seeds: int | None = None, *, part: str = "") -> RunFolder:
+    """Open the folder for the results of a study, new or begun; see `open_run`."""
+    config = {"study": study.id, "folder": study.folder, "seeds": _seeds(study, seeds), **study.sweep}
+    return open_run(Path(out), config, may_change=("folder", "seeds"), part=part)
 
 
-def _failure(job: Job, reason: str) -> Outcome:
-    return Outcome(job.settings["name"], None, " ".join(reason.split()))
-
-
-def _check_names(settings: Sequence[Settings]) -> None:
-    names = [str(one["name"]) for one in settings]
-    if not names or len(set(names)) < len(names) or any("/" in name for name in names):
-        raise PbcsError(f"the runs of a study need names of their own, without slashes; got {names[:5]}")
-
-
-def _report(records: dict[str, Record], failed: dict[str, str], on_progress: ProgressCallback | None) -> None:
-    if on_progress is not None:
-        on_progress({"runs": len(records) + len(failed), "failed": len(failed)})
+def _seeds(study: Study, seeds: int | None) -> int:
+    seeds = study.seeds if seeds is None else seeds
+    if seeds < 1:
+        raise InvalidOption(f"seeds is {seeds}; expected at least 1")
+    return seeds

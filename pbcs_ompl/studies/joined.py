@@ -24,7 +24,13 @@ def joined_success(records: Sequence[dict[str, Any]], steps: int, every: int) ->
         steps, every: The settings that all of them have, `steps` and `evaluate_every`.
     """
     times = np.arange(0, steps + 1, every)
-    return times, np.concatenate([_filled(record["success"], len(times)) for record in records], axis=1) > 0
+    return times, joined_rows(records, "success", len(times)) > 0
+
+
+def joined_rows(records: Sequence[dict[str, Any]], name: str, count: int) -> Array:
+    """Return "success" or "rewarded" of all stacks at `count` evaluations [E, S]; the last row of a stack that ended
+    early is repeated."""
+    return np.concatenate([_filled(record[name], count) for record in records], axis=1)
 
 
 def joined_first_rewards(records: Sequence[dict[str, Any]]) -> IndexArray:
@@ -37,6 +43,6 @@ def joined_observed(records: Sequence[dict[str, Any]], name: str) -> Array:
     return np.concatenate([np.array(record["observed"][name][-1]) for record in records])
 
 
-def _filled(rows: list[list[int]], count: int) -> IndexArray:
+def _filled(rows: list[list[float]], count: int) -> Array:
     table = np.array(rows)
     return np.concatenate([table, np.repeat(table[-1:], count - len(table), axis=0)])

@@ -34,13 +34,11 @@ class Probe:
         count: How many states, each with one action.
     """
 
-    def __init__(self, model: ResetAnywhere, seeds: int, count: int = 50):
+    def __init__(self, model: ResetAnywhere, count: int = 50):
         self.model, self.low, self.high = model, model.action_low, model.action_high
-        rng = np.random.default_rng(1)
-        self.states = np.repeat(sample_states(model, count)[None], seeds, axis=0)
-        self.actions = np.repeat(rng.uniform(self.low, self.high, (1, count, len(self.low))), seeds, axis=0)
-        flat = self.states.reshape(-1, self.states.shape[2])
-        self.observations = model.observe(flat).reshape(seeds, count, -1)
+        self.states = sample_states(model, count)
+        self.actions = np.random.default_rng(1).uniform(self.low, self.high, (count, len(self.low)))
+        self.observations = model.observe(self.states)
 
     def observers(self) -> dict[str, Observer]:
         """Return the diagnostics that cost little, by name."""
@@ -49,25 +47,32 @@ class Probe:
 
     def saturation(self, agent: StackedAgent) -> Array:
         """Return the share of actions at an end of the box [S]."""
-        return diagnostics.saturation(agent.act, self.observations, self.low, self.high)
+        return diagnostics.saturation(agent.act, _of_all(agent, self.observations), self.low, self.high)
 
     def flat_share(self, agent: StackedAgent) -> Array:
         """Return the share of pairs (s, a) where the critic is flat along the actions [S]."""
-        return diagnostics.flat_share(agent.value, self.observations, self.actions, self.low, self.high)
+        return diagnostics.flat_share(agent.value, _of_all(agent, self.observations), _of_all(agent, self.actions),
+                                      self.low, self.high)
 
     def deadlock_index(self, agent: StackedAgent) -> Array:
         """Return the share of states where the actor is stuck [S]."""
-        return diagnostics.deadlock_index(agent.act, agent.value, self.observations, self.low, self.high)
+        return diagnostics.deadlock_index(agent.act, agent.value, _of_all(agent, self.observations), self.low,
+                                          self.high)
 
     def largest_value(self, agent: StackedAgent) -> Array:
         """Return max |Q| [S]."""
-        return diagnostics.largest_values(agent.value, self.observations, self.actions)
+        return diagnostics.largest_values(agent.value, _of_all(agent, self.observations), _of_all(agent, self.actions))
 
     def largest_action(self, agent: StackedAgent) -> Array:
         """Return max |pi| [S]."""
-        return diagnostics.largest_actions(agent.act, self.observations)
+        return diagnostics.largest_actions(agent.act, _of_all(agent, self.observations))
 
     def distance_to_returns(self, agent: StackedAgent, discount: float, horizon: int) -> Array:
         """Return the mean of |Q - Q^pi| [S]."""
-        return diagnostics.distance_to_returns(self.model, agent.act, agent.value, self.states, self.actions, discount,
-                                               horizon)
+        return diagnostics.distance_to_returns(self.model, agent.act, agent.value, _of_all(agent, self.states),
+                                               _of_all(agent, self.actions), discount, horizon)
+
+
+def _of_all(agent: StackedAgent, values: Array) -> Array:
+    """Return the same values [B, ...] for each agent of the stack [S, B, ...]."""
+    return np.repeat(values[None], len(agent.seeds), axis=0)

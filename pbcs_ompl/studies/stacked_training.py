@@ -31,7 +31,8 @@ class LoopSettings:
             that has not found the reward trains after each episode, as in [Matheron2020] 6.2.2.
         updates_per_transition: Gradient steps for each environment step.
         evaluate_every: Steps between two evaluations, a multiple of `block`.
-        patience: A stack of which every seed has passed so many evaluations in a row ends early; 0 for never.
+        patience: A seed that has passed so many evaluations in a row leaves the stack; 0 for never. The others go on as
+            they would have in the full stack.
         expert_after: Steps after which the `expert` acts, if there is one ([Matheron2020] Fig. 6.2b).
 
     Raises:
@@ -69,7 +70,8 @@ class Curves:
         rewarded: Share of transitions with a positive reward in the replay buffer at each evaluation [E, S], and so the
             expected share in mini-batches.
         observed: What each observer said at each evaluation, by name [E, S].
-        ended: The steps that were made; less than asked for if all seeds were solved before.
+        left: The step after which each seed left, solved [S]; -1 where it stayed. In later rows it is as it was then.
+        ended: The steps that were made; less than asked for if all seeds left before.
     """
 
     seeds: tuple[int, ...]
@@ -78,6 +80,7 @@ class Curves:
     first_reward: IndexArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     rewarded: list[Array] = field(default_factory=list)
     observed: dict[str, list[Array]] = field(default_factory=dict)
+    left: IndexArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     ended: int = 0
 
     def summary(self) -> dict[str, object]:
@@ -85,13 +88,14 @@ class Curves:
         return {"seeds": list(self.seeds), "steps": self.steps, "success": np.array(self.success).astype(int).tolist(),
                 "first_reward": self.first_reward.tolist(), "rewarded": np.array(self.rewarded).tolist(),
                 "observed": {name: np.array(values).tolist() for name, values in self.observed.items()},
-                "ended": self.ended}
+                "left": self.left.tolist(), "ended": self.ended}
 
 
 class StackedTraining:
     """Collect, remember, train, evaluate, for all seeds of `agent` together.
 
-    Each seed has a random stream of its own: a stack of S seeds does what S stacks of one do.
+    Each seed has a random stream of its own: a stack of S seeds does what S stacks of one do. `agent` is the stack of
+    the `active` seeds, those that have not left.
 
     Args:
         model: The environment.
@@ -108,15 +112,16 @@ class StackedTraining:
                  expert: Callable[[Array], Array] | None = None, observers: Mapping[str, Observer] | None = None):
         self.model, self.agent, self.noise, self.settings = model, agent, noise, settings
         self.expert, self.observers = expert, dict(observers or {})
-        self.shape = (len(agent.seeds), settings.copies)
+        self.active: IndexArray = np.arange(len(agent.seeds))
         self._starts = np.array([model.initial_state(seed) for seed in agent.seeds])
         self._generators = [SeedTree(seed).child("behaviour").generator() for seed in agent.seeds]
         self._states = np.repeat(self._starts[:, None], settings.copies, axis=1)
-        self._ages = np.zeros(self.shape, dtype=np.int64)
+        self._ages = np.zeros((len(agent.seeds), settings.copies), dtype=np.int64)
         self._rewards = np.zeros(len(agent.seeds))
         self._passed = np.zeros(len(agent.seeds), dtype=np.int64)
         self._updates_due = 0.0
-        self.curves = Curves(agent.seeds, first_reward=np.full(len(agent.seeds), NEVER),
+        never = np.full(len(agent.seeds), NEVER)
+        self.curves = Curves(agent.seeds, first_reward=never, left=never.copy(),
                              observed={name: [] for name in self.observers})
 
     def run(self) -> Curves:
@@ -128,7 +133,7 @@ class StackedTraining:
     def _run(self) -> None:
         settings = self.settings
         self._evaluate()
-        while self.curves.ended < settings.steps and not self._all_solved():
+        while self.curves.ended < settings.steps and len(self.active):
             self._collect()
             self._updates_due += settings.block * settings.copies * settings.updates_per_transition
             whole = int(self._updates_due)
@@ -137,59 +142,77 @@ class StackedTraining:
                 self.agent.train(whole)
             if self.curves.ended % settings.evaluate_every == 0:
                 self._evaluate()
+                self._part_with_solved()
 
     def _collect(self) -> None:
         """Make a block of steps and remember them."""
         settings, model = self.settings, self.model
         shape = (settings.block, settings.copies)
-        draws = draw_all(self.noise, self._generators, shape, len(model.action_low))
+        generators = [self._generators[index] for index in self.active]
+        draws = draw_all(self.noise, generators, shape, len(model.action_low))
         parts = [self._step(draws[:, step]) for step in range(settings.block)]
         self.agent.remember(*(np.concatenate(part, axis=1) for part in zip(*parts, strict=True)))
 
     def _step(self, draws: Array) -> tuple[NDArray[Any], ...]:
         """Make one step; return observations, actions, rewards, next observations and terminals [S, B, ...]."""
-        before = self._flat(self._states)
+        before = self._flat(self._states[self.active])
         observations = self._stacked(self.model.observe(before))
         if self.expert is not None and self.curves.ended >= self.settings.expert_after:
             actions = self._stacked(self.expert(before))
         else:
-            actions = self.noise.apply(self.agent.explore(observations), draws, self._ages == 0,
-                                           self.model.action_low, self.model.action_high)
+            actions = self.noise.apply(self.agent.explore(observations), draws, self._ages[self.active] == 0,
+                                       self.model.action_low, self.model.action_high)
         outcome = self.model.transition(before, self._flat(actions))
         following = self._stacked(self.model.observe(outcome.states))
-        rewards, terminals = outcome.rewards.reshape(self.shape), outcome.terminated.reshape(self.shape)
+        rewards, terminals = self._stacked(outcome.rewards)[..., 0], self._stacked(outcome.terminated)[..., 0]
         self.curves.ended += 1
         self._count_rewards(rewards > 0.0)
-        self._ages += 1
-        ended = terminals | (self._ages >= self.settings.episode_steps)
-        self._ages[ended] = 0
-        self._states = np.where(ended[..., None], self._starts[:, None], self._stacked(outcome.states))
+        ages = self._ages[self.active] + 1
+        ended = terminals | (ages >= self.settings.episode_steps)
+        self._ages[self.active] = np.where(ended, 0, ages)
+        self._states[self.active] = np.where(ended[..., None], self._starts[self.active, None],
+                                             self._stacked(outcome.states))
         return observations, actions, rewards, following, terminals
 
     def _count_rewards(self, rewarded: BoolArray) -> None:
         counts = rewarded.sum(axis=1)
-        self._rewards += counts
-        first = (counts > 0) & (self.curves.first_reward == NEVER)
+        self._rewards[self.active] += counts
+        first = self.active[(counts > 0) & (self.curves.first_reward[self.active] == NEVER)]
         self.curves.first_reward[first] = self.curves.ended
 
     def _evaluate(self) -> None:
-        curves = self.curves
-        success = solved(self.model, self.agent, self._starts, self.settings.episode_steps)
-        self._passed = np.where(success, self._passed + 1, 0)
+        curves, active = self.curves, self.active
+        success = solved(self.model, self.agent, self._starts[active], self.settings.episode_steps)
+        self._passed[active] = np.where(success, self._passed[active] + 1, 0)
         curves.steps.append(curves.ended)
-        curves.success.append(success)
-        curves.rewarded.append(self._rewards / max(1, curves.ended * self.settings.copies))
+        self._add_row(curves.success, success)
+        self._add_row(curves.rewarded, self._rewards[active] / max(1, curves.ended * self.settings.copies))
         for name, observer in self.observers.items():
-            curves.observed[name].append(observer(self.agent))
+            self._add_row(curves.observed[name], observer(self.agent))
 
-    def _all_solved(self) -> bool:
-        return self.settings.patience > 0 and bool((self._passed >= self.settings.patience).all())
+    def _add_row(self, rows: list[NDArray[Any]], values: NDArray[Any]) -> None:
+        """Append a row for all seeds: `values` of the active ones, of the others what there was before."""
+        row = rows[-1].copy() if rows else np.empty(len(self.curves.seeds), dtype=values.dtype)
+        row[self.active] = values
+        rows.append(row)
+
+    def _part_with_solved(self) -> None:
+        """Let seeds that have passed `patience` evaluations in a row leave."""
+        stays = self._passed[self.active] < self.settings.patience
+        if self.settings.patience == 0 or stays.all():
+            return
+        self.curves.left[self.active[~stays]] = self.curves.ended
+        self.active = self.active[stays]
+        if len(self.active):
+            kept = np.flatnonzero(stays).tolist()
+            self.agent = self.agent.clone(kept)
+            self.noise.keep(kept)
 
     def _flat(self, values: Array) -> Array:
         return values.reshape(-1, values.shape[-1])
 
-    def _stacked(self, values: Array) -> Array:
-        return values.reshape(*self.shape, -1)
+    def _stacked(self, values: NDArray[Any]) -> NDArray[Any]:
+        return values.reshape(len(self.active), self.settings.copies, -1)
 
 
 def solved(model: ResetAnywhere, agent: StackedAgent, starts: Array, max_steps: int) -> BoolArray:

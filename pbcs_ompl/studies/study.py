@@ -3,13 +3,13 @@
 import importlib.util
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pbcs_ompl
-from pbcs_ompl.core.errors import DamagedFile, PbcsError, UnknownName
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, PbcsError, UnknownName
 from pbcs_ompl.core.run_folder import read_toml
 from pbcs_ompl.studies.claims import Claim
 
@@ -45,10 +45,23 @@ class Study:
     run: Callable[[Settings], Record]
     analyse: Callable[[list[Record], Path], list[Claim]]
 
+    def on_device(self, device: str) -> "Study":
+        """Return the same study with its agents on another device: "cpu" or "cuda".
+
+        Raises:
+            InvalidOption: the sweep has no "device", or there is no such device.
+        """
+        from pbcs_ompl.agents.update import choose_device  # many studies need no torch
+
+        if "device" not in self.sweep:
+            raise InvalidOption(f"{self.id} has no agents whose device could be chosen; leave out device {device!r}")
+        choose_device(device)
+        return replace(self, sweep=self.sweep | {"device": device})
+
 
 def study_ids() -> dict[str, str]:
     """Return the titles of all studies at hand, by id."""
-    return {name: str(_sweep(folder).get("title", "")) for name, folder in sorted(_folders().items())}
+    return {name: str(_sweep(folder).get("title", "")) for name, folder in sorted(study_folders().items())}
 
 
 def find_study(name: str) -> Study:
@@ -61,9 +74,9 @@ def find_study(name: str) -> Study:
         DamagedFile: the sweep does not parse, or lacks `title` or `seeds`.
         PbcsError: a script does not run, or lacks a function.
     """
-    folder = Path(name) if (Path(name) / SCRIPT).is_file() else _folders().get(name)
+    folder = Path(name) if (Path(name) / SCRIPT).is_file() else study_folders().get(name)
     if folder is None:
-        raise UnknownName("study", name, _folders())
+        raise UnknownName("study", name, study_folders())
     sweep = _sweep(folder)
     script, analysis = _load(folder / SCRIPT, "runs", "run"), _load(folder / ANALYSIS, "analyse")
     for key in ("title", "seeds"):
@@ -73,7 +86,8 @@ def find_study(name: str) -> Study:
     return Study(folder.resolve().name, folder, title, seeds, sweep, script.runs, script.run, analysis.analyse)
 
 
-def _folders() -> dict[str, Path]:
+def study_folders() -> dict[str, Path]:
+    """Return the folders of all studies at hand, by id."""
     roots = (Path(pbcs_ompl.__file__).parents[1] / STUDIES, STUDIES)
     return {path.parent.name: path.parent for root in roots for path in root.glob(f"*/{SCRIPT}")}
 

@@ -92,10 +92,9 @@ def select(queue: BinQueue, uniforms: NDArray[np.float64], nodes: NDArray[np.int
         nodes[i] = choose(pool, heads, choose(order, head, 0, uniforms[i, 0]), uniforms[i, 1])
 
 
-@njit(cache=True)
 def tied_bins(queue: BinQueue) -> int:
     """Return how many bins share the lowest count."""
-    return queue.head[0, LENGTH] - queue.head[0, LOWEST]
+    return int(queue.head[0, LENGTH] - queue.head[0, LOWEST])
 
 
 @njit(cache=True)

@@ -32,9 +32,9 @@ from pbcs_ompl.core.run_folder import read_toml
 from pbcs_ompl.reset_anywhere import make
 
 MAZE = "pbcs/Maze-v0"
-SUMMARY = ["solved", "transitions", "seconds", "nodes", "path_length", "replay_ok", "planner", "env", "seed",
-           "out"]
-FILES = ["config.toml", "result.json", "trajectory.npz", "tree.npz"]
+SUMMARY = ["solved", "transitions", "collision_checks", "seconds", "nodes", "path_length", "replay_ok", "planner",
+           "env", "seed", "out"]
+FILES = ["config.toml", "provenance.json", "result.json", "trajectory.npz", "tree.npz"]
 STOCK = [oc.RRT, oc.EST, oc.KPIECE1]
 
 

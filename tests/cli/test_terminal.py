@@ -1,13 +1,17 @@
 """What is printed: numbers for people, one JSON line for scripts."""
 
+import io
 import json
+import re
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from pbcs_ompl.cli.folders import fresh_folder
-from pbcs_ompl.cli.terminal import Report, conclude, duration, short
+from pbcs_ompl.cli.terminal import Report, conclude
+from pbcs_ompl.core.wording import duration, short
 
 
 @pytest.mark.parametrize(("value", "text"), [(1234567, "1,234,567"), (1234.5, "1,234"), (0.12345, "0.123"),
@@ -44,6 +48,31 @@ def test_progress_without_a_terminal_is_a_line_now_and_then_with_rate_and_time_l
     lines = capsys.readouterr().err.splitlines()
     assert lines == ["plan: transitions 200, 16.7 transitions/s, at most 48 s left",
                      "plan: transitions 400, 16.7 transitions/s, at most 36 s left"]
+
+
+TABLE = [{"planner": "Ex", "runs": "3/4", "median": 1234.5}, {"planner": "RRT", "runs": "0/4", "median": "-"}]
+
+
+def test_a_table_without_a_terminal_is_a_line_for_each_row(capsys, monkeypatch):
+    clock = iter(range(0, 1000, 20))
+    monkeypatch.setattr("pbcs_ompl.cli.terminal.time", SimpleNamespace(monotonic=lambda: float(next(clock))))
+    with Report("compare", count="runs", budget=8) as report:
+        report({"runs": 3, "table": TABLE})
+    assert capsys.readouterr().err.splitlines() == [
+        "compare: runs 3, 0.15 runs/s, at most 33 s left", "  planner Ex, runs 3/4, median 1,234",
+        "  planner RRT, runs 0/4, median -"]
+
+
+def test_a_table_on_a_terminal_stands_under_the_bar(monkeypatch):
+    screen = Console(file=io.StringIO(), force_terminal=True, no_color=True, width=100)
+    monkeypatch.setattr("pbcs_ompl.cli.terminal.Console", lambda **_: screen)
+    with Report("compare", count="runs", budget=8) as report:
+        report({"runs": 3, "table": TABLE})
+    plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", screen.file.getvalue())
+    shown = [line.split() for line in plain.splitlines()]
+    assert ["planner", "runs", "median"] in shown
+    assert ["Ex", "3/4", "1,234"] in shown
+    assert ["RRT", "0/4", "-"] in shown
 
 
 def test_fresh_folder_takes_the_next_free_number(tmp_path, monkeypatch):

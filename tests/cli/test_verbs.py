@@ -42,7 +42,7 @@ def test_plan_then_train_then_eval(pbcs, tmp_path):
     assert (plan["solved"], plan["replay_ok"], plan["seed"]) == (True, True, 3)
     assert plan["out"] == "runs/plan-Maze-v0-Ex-3"
     files = {path.name for path in (tmp_path / plan["out"]).iterdir()}
-    assert files == {"config.toml", "result.json", "trajectory.npz", "tree.npz", "tree.png"}
+    assert files == {"config.toml", "provenance.json", "result.json", "trajectory.npz", "tree.npz", "tree.png"}
 
     status, result, error = pbcs(f"train {MAZE} --path {plan['out']} --out runs/chain --json")
     assert status == 0
@@ -65,6 +65,21 @@ def test_compare(pbcs, tmp_path):
     assert all(set(row) >= ROW for row in comparison["rows"])
     assert [row["solved"] for row in comparison["rows"]] == [2, 2, 0]
     assert (tmp_path / "runs/compare-Maze-v0-Ex-KPIECE1-SST-2/compare.png").exists()
+
+
+def test_compare_in_several_environments_with_options(pbcs, tmp_path):
+    status, found, error = pbcs("compare --planners Ex RandomWalk --planner-kwargs '{\"Ex\": {\"bin_size\": 0.3}}' "
+                                "--env pbcs/Maze-v0 pbcs/Box-v0 --start-seed 4 --seeds 6 --max-seconds 60 "
+                                "--max-transitions 2000 --out both --json")
+    assert status == 0
+    labels = ["pbcs/Maze-v0(--start-seed=4)", "pbcs/Box-v0(--start-seed=4)"]
+    assert [row["environment"] for row in found["rows"]] == [labels[0], labels[0], labels[1], labels[1]]
+    assert [test["environment"] for test in found["tests"]] == labels
+    assert all(f"in        {label}\n" in error for label in labels)
+    assert "pair      Ex needs less than RandomWalk in" in error
+    assert {"compare.png", "coverage.png", "comparison.db", "comparison-1-Maze-v0.log", "comparison-2-Box-v0.log"} < \
+        {path.name for path in (tmp_path / "both").iterdir()}
+    assert "bin_size = 0.3" in (tmp_path / "both/comparison-1-Maze-v0.log").read_text()
 
 
 def test_doctor(pbcs):
@@ -146,6 +161,12 @@ MISTAKES = [
     ("eval taken", 2, "chain.json does not exist"),
     (f"compare --planners Ex Exx {MAZE}", 2, "did you mean 'Ex'?"),
     (f"compare --planners Ex Ex {MAZE}", 2, "twice"),
+    (f"compare --planners Ex --planner-kwargs '{{\"EX\": {{}}}}' {MAZE}", 2, "did you mean 'Ex'?"),
+    (f"compare --planners Ex --planner-kwargs '{{\"Ex\": 1}}' {MAZE}", 2, "options for 'Ex' are 1"),
+    (f"compare --planners Ex --planner-kwargs '{{\"Ex\": {{\"bin_sise\": 1}}}}' {MAZE}", 2, "did you mean 'bin_size'?"),
+    ("compare --planners Ex --env pbcs/Maze-v0 pbcs/Maze-v0", 2, "twice"),
+    ("compare --planners Ex --env pbcs/Maze-v0 pbcs/Box-v0 --env-kwargs '{}' '{}' '{}'", 2, "2 environments and"),
+    (f"compare --planners Ex {MAZE} --max-memory 0", 2, "at least 1"),
     ("doctor --env nowhere/Thing-v0", 2, "unknown environment"),
 ]
 

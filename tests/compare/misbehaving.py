@@ -1,6 +1,7 @@
 """Planners that go wrong, found as `misbehaving:NAME` by the processes of a comparison."""
 
 import os
+import re
 import signal
 from pathlib import Path
 
@@ -25,6 +26,28 @@ class Deadly(ob.Planner):
 
     def solve(self, ptc):
         os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Hanging(ob.Planner):
+    """Never comes back, and never lets another thread of Python work, as a loop in C++ does."""
+
+    def __init__(self, si):
+        super().__init__(si, "Hanging")
+
+    def solve(self, ptc):
+        re.match(r"(a+)+b", "a" * 64)
+
+
+class Hungry(ob.Planner):
+    """Takes more and more memory."""
+
+    def __init__(self, si):
+        super().__init__(si, "Hungry")
+
+    def solve(self, ptc):
+        hoard = []
+        while True:
+            hoard.append(bytearray(os.urandom(1)) * 10_000_000)
 
 
 class Waiting(ob.Planner):

@@ -1,34 +1,53 @@
-"""The database is what OMPL's own converter would write, with more columns behind."""
+"""The log is what OMPL's own reader takes, and the database it makes holds every number of the records."""
 
+import json
 import sqlite3
+from pathlib import Path
 
 import pytest
+from ompl.tools import readBenchmarkLog
 
+from pbcs_ompl.compare.benchmark_log import write_logs
 from pbcs_ompl.compare.database import write_database
-from pbcs_ompl.compare.run import Job, broken
+from pbcs_ompl.compare.run import broken
+from pbcs_ompl.compare.sweep import make_sweep
 from pbcs_ompl.core.errors import RunFolderError
 
-CONFIG = {"env": "pbcs/Maze-v0", "planners": ["Ex", "RRT"], "seeds": [0, 1], "max_transitions": 100,
-          "max_seconds": None, "planner_kwargs": {"Ex": {"bin_size": 0.1}}, "versions": {"ompl": "2.0.1"}}
 EXPERIMENTS = ["id", "name", "totaltime", "timelimit", "memorylimit", "runcount", "version", "hostname",
                "cpuinfo", "date", "seed", "setup"]
-
-
-def solved(planner, seed):
-    return {"planner": planner, "seed": seed, "solved": True, "transitions": 50, "seconds": 0.5, "nodes": 20,
-            "path_length": 7, "replay_ok": True, "memory": 100.0, "reason": None}
+OURS = ["transitions", "collision_checks", "path_length", "replay_ok", "coverage", "seed"]
 
 
 @pytest.fixture
-def database(tmp_path):
-    job = Job("RRT", 1, "pbcs/Maze-v0", {}, {}, 100, None)
-    records = [solved("Ex", 0), solved("Ex", 1), solved("RRT", 0), broken(job, "died")]
-    write_database(tmp_path / "c.db", CONFIG, records)
-    write_database(tmp_path / "c.db", CONFIG, records)
+def sweep():
+    return make_sweep({"Ex": {"bin_size": [0.1, 0.2]}, "RRT": {}}, "pbcs/Maze-v0", [{"size": 2}, {"size": 3}], [4, 5],
+                      100, None, 500.0)
+
+
+@pytest.fixture
+def records(sweep):
+    """Every run is solved but those of RRT: one fails, one is not solved."""
+    made = []
+    for number, job in enumerate(sweep.jobs(), start=1):
+        record = {**broken(job, ""), "solved": True, "transitions": 50 + number, "collision_checks": 60 + number,
+                  "seconds": 0.5 * number, "nodes": 20, "path_length": 7, "replay_ok": True, "memory": 100.5,
+                  "coverage": 0.25, "progress": {"transitions": [1, 50], "seconds": [1e-7, 0.5 * number],
+                                                 "coverage": [0.125, 0.25]}, "reason": None}
+        unsolved = {**record, "solved": False, "path_length": None, "replay_ok": None}
+        made.append(record if job.planner == "Ex" else broken(job, "died") if job.seed == 4 else unsolved)
+    return made
+
+
+@pytest.fixture
+def database(sweep, records, tmp_path):
+    logs = write_logs(tmp_path, sweep, records)
+    assert [log.name for log in logs] == ["comparison-1-Maze-v0.log", "comparison-2-Maze-v0.log"]
+    for _ in range(2):
+        write_database(tmp_path / "c.db", logs)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.db", *(log.name for log in logs)]
     connection = sqlite3.connect(tmp_path / "c.db")
     yield connection
     connection.close()
-    assert [path.name for path in tmp_path.iterdir()] == ["c.db"]
 
 
 def columns(database, table):
@@ -36,36 +55,53 @@ def columns(database, table):
 
 
 def test_columns_planner_arena_relies_on(database):
-    assert columns(database, "experiments")[:12] == EXPERIMENTS
+    assert columns(database, "experiments") == [*EXPERIMENTS, "transition_limit"]
     assert columns(database, "runs")[:3] == ["id", "experimentid", "plannerid"]
-    assert columns(database, "progress")[:2] == ["runid", "time"]
-    assert columns(database, "plannerConfigs") == ["id", "name", "settings"]
-    assert columns(database, "enums") == ["name", "value", "description"]
+    assert columns(database, "runs")[-6:] == OURS
+    assert columns(database, "progress") == ["runid", "time", "transitions", "coverage"]
 
 
-def test_runs_belong_to_their_planner(database):
-    query = ("SELECT p.name, r.seed, r.solved, r.transitions, e.description FROM runs r "
-             "JOIN plannerConfigs p ON p.id = r.plannerid JOIN experiments x ON x.id = r.experimentid "
-             "JOIN enums e ON e.name = 'status' AND e.value = r.status ORDER BY r.id")
-    assert database.execute(query).fetchall() == [
-        ("Ex", 0, 1, 50, "Exact solution"), ("Ex", 1, 1, 50, "Exact solution"),
-        ("RRT", 0, 1, 50, "Exact solution"), ("RRT", 1, 0, None, "Crash")]
-    assert database.execute("SELECT version, runcount, totaltime FROM experiments").fetchall() == \
-        [("OMPL 2.0.1", 2, 1.5)]
-    settings = database.execute("SELECT settings FROM plannerConfigs").fetchall()
-    assert settings == [('{"bin_size": 0.1}',), ("{}",)]
+def test_every_number_of_every_record_arrives(database, records):
+    names = ["time", "memory", "solved", *OURS, "correct_solution", "solution_length", "graph_states"]
+    found = database.execute("SELECT x.name, p.name, e.description, " + ", ".join(f"r.{name}" for name in names) +
+                             " FROM runs r JOIN plannerConfigs p ON p.id = r.plannerid "
+                             "JOIN experiments x ON x.id = r.experimentid "
+                             "JOIN enums e ON e.name = 'status' AND e.value = r.status").fetchall()
+    fields = ["seconds", "memory", "solved", *OURS, "replay_ok", "path_length", "nodes"]
+    expected = [(f"pbcs/Maze-v0(size={record['env_kwargs']['size']})", record["planner"],
+                 "Exact solution" if record["solved"] else "Crash" if record["seconds"] is None else "Timeout",
+                 *(record[name] for name in fields)) for record in records]
+    assert sorted(found, key=str) == sorted(expected, key=str)
 
 
-def test_ompls_own_views_work(database, tmp_path):
-    from ompl._benchmark_statistics import computeViews
-
-    database.close()
-    computeViews(str(tmp_path / "c.db"), False)
-    with sqlite3.connect(tmp_path / "c.db") as again:
-        best = again.execute("SELECT * FROM bestPlannerConfigsPerExperiment").fetchall()
-    assert len(best) == 2
+def test_progress_belongs_to_its_run(database, records):
+    query = "SELECT r.transitions, g.time, g.transitions, g.coverage FROM progress g JOIN runs r ON r.id = g.runid"
+    expected = [(record["transitions"], *sample) for record in records if record["progress"] is not None
+                for sample in zip(*(record["progress"][name] for name in ("seconds", "transitions", "coverage")),
+                                  strict=True)]
+    assert sorted(database.execute(query).fetchall()) == sorted(expected)
 
 
-def test_folder_that_cannot_be_written(tmp_path):
+def test_what_an_experiment_says(database, sweep):
+    found = database.execute("SELECT version, runcount, timelimit, memorylimit, transition_limit, seed, setup "
+                             "FROM experiments").fetchall()
+    assert [row[:6] for row in found] == [(f"OMPL {sweep.versions['ompl']}", 2, None, 500.0, 100, "4")] * 2
+    assert json.loads(found[0][6]) == sweep.config()
+    assert database.execute("SELECT name, settings FROM plannerConfigs").fetchall() == \
+        [("Ex", "bin_size = [0.1, 0.2]\n;"), ("RRT", "")]
+    assert len(database.execute("SELECT * FROM bestPlannerConfigsPerExperiment").fetchall()) == 4
+
+
+def test_the_log_says_the_same_to_the_command_of_ompl(sweep, records, tmp_path, capsys):
+    """`ompl_benchmark_statistics` calls this reader; so a user may put several comparisons into one database."""
+    logs = [str(log) for log in write_logs(tmp_path, sweep, records)]
+    for _ in range(2):
+        readBenchmarkLog(str(tmp_path / "both.db"), logs, False)
+    with sqlite3.connect(tmp_path / "both.db") as both:
+        assert both.execute("SELECT count(*) FROM runs").fetchone() == (2 * len(records),)
+        assert both.execute("SELECT count(*) FROM plannerConfigs").fetchone() == (2,)
+
+
+def test_folder_that_cannot_be_written():
     with pytest.raises(RunFolderError, match="cannot write"):
-        write_database(tmp_path / "nowhere" / "c.db", CONFIG, [])
+        write_database(Path("/nowhere/c.db"), [])

@@ -113,6 +113,21 @@ def test_a_clone_goes_on_alone(entry):
     assert np.array_equal(probe(agent), probe(copy))
 
 
+@pytest.mark.parametrize("layer_norm", [False, True])
+def test_a_part_of_a_stack_goes_on_as_it_would_have_in_the_whole(entry, layer_norm):
+    whole = fill(make(entry, 5, 6, 7, 8, layer_norm=layer_norm), 0, 1, 2, 3)
+    whole.train(21)
+    whole.explore(np.zeros((4, 5, 3)))
+    part = whole.clone([3, 1])
+    assert part.seeds == (8, 6)
+    assert np.array_equal(probe(part), probe(whole)[[3, 1]])
+    fill(whole, 10, 11, 12, 13).train(40)
+    fill(part, 13, 11).train(40)
+    np.testing.assert_allclose(probe(part), probe(whole)[[3, 1]], atol=1e-5)
+    explored = whole.explore(np.ones((4, 5, 3)))[[3, 1]]
+    np.testing.assert_allclose(part.explore(np.ones((2, 5, 3))), explored, atol=1e-5)
+
+
 def test_updates_do_not_depend_on_how_many_are_asked_for_at_once(entry):
     first, second = fill(make(entry, 1), 3), fill(make(entry, 1), 3)
     first.train(20)

@@ -50,6 +50,22 @@ def test_a_batch_on_threads_is_the_episode(kind: Any, threads: int) -> None:
         np.testing.assert_array_equal(after.success, [answer[4]["is_success"] for answer in answers[:size]])
 
 
+def test_a_planned_tree_is_the_same_on_any_threads_and_every_edge_is_one_step_of_the_environment() -> None:
+    trees = [plan("pbcs/AntMaze-v0", "Ex", env_kwargs={"threads": threads}, seed=3, max_transitions=400).tree
+             for threads in (1, 2, 3)]
+    for tree in trees[1:]:
+        np.testing.assert_array_equal(tree.states, trees[0].states)
+        np.testing.assert_array_equal(tree.parents, trees[0].parents)
+    states, parents, controls = trees[0].states, trees[0].parents, trees[0].controls
+    assert controls is not None
+    env = AntMazeEnv()
+    env.reset(seed=7)
+    for node in range(1, len(states)):
+        env.set_env_state(states[parents[node]])
+        env.step(controls[node])
+        np.testing.assert_array_equal(env.get_env_state(), states[node])
+
+
 @pytest.mark.parametrize(("kind", "env_id"), [(AntMazeEnv, "Ant-v5"), (SparseHalfCheetahEnv, "HalfCheetah-v5")])
 def test_physics_is_gymnasiums_up_to_the_warm_start(kind: Any, env_id: str) -> None:
     theirs: Any = gymnasium.make(env_id).unwrapped

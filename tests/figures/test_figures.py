@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from pbcs_ompl.core.errors import Mismatch, RunFolderError
 from pbcs_ompl.figures.canvas import new_figure, save
 from pbcs_ompl.figures.chain import chain_figure
-from pbcs_ompl.figures.compare import compare_figure
 from pbcs_ompl.figures.critic import critic_figure
 from pbcs_ompl.figures.maze import plane
 from pbcs_ompl.figures.tree import MOST_EDGES, depth, tree_figure
@@ -106,14 +105,6 @@ def test_critic_field_holds_the_values_of_the_critic(tmp_path, walk):
     assert values[0, -1] == pytest.approx(high + 10 * low)
     assert values[-1, 0] == pytest.approx(low + 10 * high)
     assert save(figure, tmp_path / "critic.png").exists()
-
-
-def test_comparison_ends_at_the_solved_share(tmp_path):
-    figure = compare_figure({"Ex": [10, 20, None, 40], "EST": [None, None]}, title="two planners")
-    ex, est = figure.axes[0].lines
-    assert ex.get_ydata()[-1] == 0.75
-    assert list(est.get_ydata()) == [0, 0]
-    assert save(figure, tmp_path / "compare.png").exists()
 
 
 def test_no_plane_is_a_clear_error():

@@ -71,6 +71,24 @@ def test_growing_batches_cost_few_more_transitions(solve, square, compiled_squar
     assert batched < 1.6 * alone
 
 
+@pytest.mark.parametrize("portion", [2, 8])
+def test_batches_come_in_portions_that_keep_all_cores_busy(solve, square, portion):
+    model, sizes = square(goal=9.0), []
+    transition = model.transition
+
+    def counted(states, controls):
+        sizes.append(len(states))
+        return transition(states, controls)
+
+    model.parallel_batch, model.transition = portion, counted
+    planner, _, counter, _ = solve(lambda si: Ex(si), model, 4001)
+    assert planner.error is None
+    assert counter.count == sum(sizes) == 4001
+    assert sizes[-1] % portion == 1  # the rest of the budget
+    assert min(sizes[:-1]) == portion
+    assert not any(size % portion for size in sizes[:-1])
+
+
 def test_terminal_states_are_never_expanded(solve, square):
     class Deadly(square):
         def transition(self, states, controls):

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
 from pbcs_ompl.reset_anywhere import make
 from pbcs_ompl.reset_anywhere.ball import uniform_in_ball
@@ -42,6 +43,23 @@ def test_without_rejection_some_draws_lie_in_walls() -> None:
 def test_no_valid_state_near() -> None:
     with pytest.raises(InvalidState, match=r"no valid state within 0\.01"):
         MODEL.perturb(np.array([0.5, 1.0]), 0.01, 3, np.random.default_rng(0))
+
+
+def test_rollouts_find_what_is_about_to_arrive_when_they_know_where_it_comes_from() -> None:
+    """A car that rolls to the left: random steps from a state lie to its left, those from before it on both sides."""
+    car = make("MountainCarContinuous-v0")
+    path = [car.initial_state(0)]
+    for _ in range(15):
+        path.append(car.transition(path[-1][None], np.array([[-1.0]])).states[0])
+    states, place = np.array(path), lambda found: found[:, 0] - path[-1][0]
+    passed = car.perturb(states[-1], 0.1, 50, np.random.default_rng(0))
+    assert (place(passed) <= 0.0).all()
+    counter = Counter()
+    around = car.perturb(states[-1], 0.1, 50, np.random.default_rng(0), before=states[10:15], counter=counter)
+    assert (place(around) > 0.0).mean() > 0.2
+    assert (place(around) < 0.0).any()
+    assert (car.distance(around, states[-1]) <= 0.1).all()
+    assert 50 < counter.count < 2000
 
 
 @pytest.mark.parametrize("radius", [-0.1, float("nan"), float("inf")])

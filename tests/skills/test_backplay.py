@@ -88,12 +88,29 @@ def test_without_any_skill_training_goes_on_with_the_same_segment():
 
 
 def test_a_skill_that_never_starts_gets_fresh_networks():
+    """Once for the first start point; then all of them are passed over; then once more, and so on."""
     backplay, learner = run(9, lambda index, sessions: 0.4, steps=200, alpha=3, keep_partial=False, min_stride=2,
                             max_stride=4)
     assert not backplay.done
     assert backplay.saved_policy is None
     assert learner.restarts > 3
+    tested = [index for kind, index in learner.log if kind == "test"]
+    assert list(dict.fromkeys(tested)) == [7, 5, 3, 1, 0]
+
+
+@pytest.mark.parametrize("hopeless", [{7}, {7, 5}])
+def test_with_fresh_networks_a_start_that_stays_partly_solved_is_passed_over(hopeless):
+    partly = lambda index, sessions: 0.6 if index in hopeless else 1.0  # noqa: E731
+    backplay, learner = run(9, partly, alpha=2, keep_partial=False, min_stride=2, max_stride=2)
+    assert backplay.done
+    assert backplay.state.saved == 0
+    assert learner.restarts == 1
+
+
+def test_without_any_success_nothing_is_passed_over():
+    _, learner = run(9, lambda index, sessions: 0.0, steps=100, alpha=2, keep_partial=False, min_stride=2, max_stride=2)
     assert {index for _, index in learner.log} == {7}
+    assert learner.restarts > 3
 
 
 def test_the_stride_doubles_while_tests_pass_and_halves_when_they_fail():

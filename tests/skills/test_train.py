@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.bridge.plan import plan
+from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.errors import (
     CallbackFailed,
     DamagedFile,
@@ -18,6 +19,7 @@ from pbcs_ompl.core.errors import (
     TrainingStalled,
     UnknownName,
 )
+from pbcs_ompl.core.run_folder import read_toml
 from pbcs_ompl.reset_anywhere import make
 from pbcs_ompl.skills import SkillChain, resume, train
 from pbcs_ompl.skills.policy import policy_to_arrays
@@ -37,7 +39,7 @@ def test_pbcs_solves_the_small_maze(tmp_path):
     assert result.solved
     assert result.robust.success_rate >= 0.95
     assert {path.name for path in (tmp_path / "run").iterdir()} == {
-        "config.toml", "result.json", "plan.json", "trajectory.npz", "chain"}
+        "config.toml", "provenance.json", "result.json", "plan.json", "trajectory.npz", "chain"}
     chain = SkillChain.load(tmp_path / "run" / "chain")
     model = make("pbcs/Maze-v0", MAZE)
     np.testing.assert_array_equal(chain.rollout(model, model.initial_state(0)),
@@ -164,10 +166,27 @@ def test_a_plan_made_before_is_used():
         train("pbcs/Maze-v0", env_kwargs={"size": 3}, trajectory=found.trajectory)
 
 
+def test_the_planner_can_be_chosen_and_the_folder_says_which(tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, planner="KPIECE1", planner_kwargs={"hold": 2},
+              out=tmp_path / "run", on_progress=StopAfter(1))
+    config = read_toml(tmp_path / "run" / "config.toml")
+    assert (config["planner"], config["planner_kwargs"]) == ("KPIECE1", {"hold": 2})
+    found = Trajectory.load(tmp_path / "run" / "trajectory.npz")
+    assert found.planner == "KPIECE1"
+    with pytest.raises(InvalidOption, match="remove planner"):
+        train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=found, planner="KPIECE1")
+    with pytest.raises(KeyboardInterrupt):
+        resume(tmp_path / "run", on_progress=StopAfter(1))
+
+
 @pytest.mark.parametrize(("options", "error", "hint"), [
     ({"agent": "dpg"}, UnknownName, "did you mean 'ddpg'"),
     ({"method": "pbsc"}, UnknownName, "did you mean 'pbcs'"),
     ({"preset": "slow"}, UnknownName, "preset"),
+    ({"planner": "Exx"}, UnknownName, "did you mean 'Ex'"),
+    ({"planner_kwargs": {"hld": 10}}, InvalidOption, "did you mean 'hold'"),
+    ({"method": "plain", "planner": "RRTNH"}, InvalidOption, "without a plan"),
     ({"prest": "fast"}, UnknownName, "did you mean 'preset'"),
     ({"settings": {"bta": 3}}, InvalidOption, "did you mean 'beta'"),
     ({"agent_settings": {"discont": 0.5}}, InvalidOption, "did you mean 'discount'"),

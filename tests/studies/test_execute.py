@@ -94,7 +94,7 @@ def test_a_killed_study_goes_on(folder, tmp_path):
     (folder / "coin-2").write_text("wait")
     command = [sys.executable, "-m", "pbcs_ompl.cli", "study", str(folder), "--out", str(tmp_path / "out")]
     child = subprocess.Popen(command, start_new_session=True)
-    while not (folder / "log").is_file() or len(log(folder)) < 3:
+    while not (tmp_path / "out/runs/coin-1.json").is_file() or len(log(folder)) < 3:
         assert child.poll() is None
         time.sleep(0.05)
     os.killpg(child.pid, signal.SIGKILL)

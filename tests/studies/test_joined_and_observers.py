@@ -46,7 +46,7 @@ def test_observers_give_each_seed_what_it_gets_alone():
 
     def observed(seeds):
         agent = DDPG(1, model.action_low, model.action_high, seeds=seeds, settings=DDPGSettings(hidden=(8,)))
-        return {name: observer(agent) for name, observer in Probe(model, len(seeds)).observers().items()}
+        return {name: observer(agent) for name, observer in Probe(model).observers().items()}
 
     together, alone = observed((1, 2)), observed((2,))
     for name, values in together.items():

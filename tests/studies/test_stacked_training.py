@@ -49,11 +49,33 @@ def test_the_expert_comes_when_it_is_told_to():
     assert curves.ended == 200
 
 
+@pytest.mark.parametrize("noise", ["epsilon-greedy", "ornstein-uhlenbeck"])
+def test_a_seed_does_the_same_in_a_stack_that_others_leave(noise):
+    observers = {"action": lambda agent: agent.act(np.zeros((len(agent.seeds), 1, 1)))[:, 0, 0]}
+    together, leaving = (training(tuple(range(10)), noise, steps=1000, patience=patience, copies=2,
+                                  observers=observers) for patience in (0, 2))
+    full, curves = together.run(), leaving.run()
+    assert (full.left == NEVER).all()
+    assert len(set(curves.left.tolist())) > 2, "the case needs seeds that leave one after the other"
+    np.testing.assert_array_equal(leaving.active, np.flatnonzero(curves.left == NEVER))
+    np.testing.assert_array_equal(curves.first_reward, full.first_reward)
+    for index, left in enumerate(curves.left):
+        rows = [row for row, step in enumerate(full.steps) if left == NEVER or step <= left]
+        for name in ("success", "rewarded"):
+            np.testing.assert_array_equal(np.array(getattr(curves, name))[rows, index],
+                                          np.array(getattr(full, name))[rows, index])
+        np.testing.assert_allclose(np.array(curves.observed["action"])[rows, index],
+                                   np.array(full.observed["action"])[rows, index], atol=1e-6)
+        if left != NEVER:
+            assert np.array(curves.success)[rows[-1] - 1:, index].all()
+
+
 def test_a_solved_stack_ends_early():
     always = training((0, 1), steps=5000, patience=2, expert=lambda states: np.full_like(states, -0.1))
     curves = always.run()
     assert curves.ended < 5000
     assert np.array(curves.success)[-2:].all()
+    assert curves.left.max() == curves.ended
 
 
 def test_solved_is_what_the_policy_does():

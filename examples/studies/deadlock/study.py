@@ -15,17 +15,19 @@ from pbcs_ompl.studies.joined import chunks
 from pbcs_ompl.studies.observers import Probe
 from pbcs_ompl.studies.stacked_training import LoopSettings, StackedTraining
 
-SLICED_STATES = (0.0, 0.05, 0.1, 0.3)
+MAPPED_STATES = np.linspace(0.0, 1.0, 101)
 HORIZON = 50
-MOST_SLICES = 2
+MOST_CRITICS = 2
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
     """One run for each stack of each variant, and one on Drift."""
     common = {"agent_settings": sweep["agent"], "device": sweep["device"]}
+    stack = sweep["stack"][sweep["device"].partition(":")[0]]
     stacks = [{"name": f"{variant}-{chunk[0]}-{chunk[-1]}", "variant": variant, "seeds": chunk, "loop": sweep["loop"],
                **common, **options}
-              for variant, options in sweep["variants"].items() for chunk in chunks(seeds, sweep["stack"])]
+              for variant, options in sweep["variants"].items()
+              for chunk in chunks(min(seeds, options.get("most_seeds", seeds)), stack)]
     return [*stacks, {"name": "drift", "variant": "drift", "agent": "ddpg", "drift": sweep["drift"], **common}]
 
 
@@ -34,18 +36,19 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     if settings["variant"] == "drift":
         return _drift(settings)
     model = make("pbcs/Toy1D-v0")
-    agent, probe = _agent(settings, model, settings["seeds"]), Probe(model, len(settings["seeds"]))
+    agent, probe = _agent(settings, model, settings["seeds"]), Probe(model)
+    discount = settings["agent_settings"]["discount"]
+    observers = probe.observers() | {
+        "distance_to_returns": lambda agent: probe.distance_to_returns(agent, discount, HORIZON)}
     expert_after = settings.get("expert_after")
     expert: Callable[[Array], Array] | None = None if expert_after is None else (
         lambda states: np.broadcast_to(model.action_low, (len(states), 1)))
     loop = LoopSettings(**settings["loop"], expert_after=expert_after or 0)
-    training = StackedTraining(model, agent, make_noise(settings["noise"]), loop, expert=expert,
-                               observers=probe.observers())
+    training = StackedTraining(model, agent, make_noise(settings["noise"]), loop, expert=expert, observers=observers)
     curves = training.run()
-    failed = np.flatnonzero(~curves.success[-1])
-    distance = probe.distance_to_returns(agent, settings["agent_settings"]["discount"], HORIZON)
+    failed = np.flatnonzero(~curves.success[-1][training.active])
     return {"variant": settings["variant"], "loop": settings["loop"], "expert_after": expert_after, **curves.summary(),
-            "distance_to_returns": distance.tolist(), "slices": _slices(agent, failed[:MOST_SLICES])}
+            "critics": _critics(training.agent, failed[:MOST_CRITICS]) if len(failed) else []}
 
 
 def _agent(settings: dict[str, Any], model: ResetAnywhere, seeds: list[int]) -> StackedAgent:
@@ -54,13 +57,13 @@ def _agent(settings: dict[str, Any], model: ResetAnywhere, seeds: list[int]) -> 
                 settings=kind.settings_type(**settings["agent_settings"]))
 
 
-def _slices(agent: StackedAgent, failed: Array) -> list[dict[str, Any]]:
-    """Return Q along the actions, and the actor's action, in a few states, of some failed seeds."""
-    states = np.broadcast_to(np.array(SLICED_STATES)[:, None], (len(agent.seeds), len(SLICED_STATES), 1))
+def _critics(agent: StackedAgent, failed: Array) -> list[dict[str, Any]]:
+    """Return Q along the states and the actions, and the actor's actions, of some failed seeds of the stack."""
+    states = np.broadcast_to(MAPPED_STATES[:, None], (len(agent.seeds), len(MAPPED_STATES), 1))
     line, values = value_slices(agent.value, states, agent.action_low, agent.action_high)
     actions = agent.act(states)[..., 0]
-    return [{"seed": agent.seeds[index], "actions": line.tolist(), "values": values[index].tolist(),
-             "chosen": actions[index].tolist()} for index in failed]
+    return [{"seed": agent.seeds[index], "states": MAPPED_STATES.tolist(), "actions": line.tolist(),
+             "values": values[index].round(5).tolist(), "chosen": actions[index].tolist()} for index in failed]
 
 
 def _fill_without_reward(agent: StackedAgent, count: int) -> None:
@@ -77,7 +80,7 @@ def _drift(settings: dict[str, Any]) -> dict[str, Any]:
     """Train on random transitions without any reward; take down how far actor and critic go."""
     model, drift = make("pbcs/Drift-v0"), settings["drift"]
     seeds = list(range(drift["seeds"]))
-    agent, probe = _agent(settings, model, seeds), Probe(model, len(seeds))
+    agent, probe = _agent(settings, model, seeds), Probe(model)
     _fill_without_reward(agent, drift["transitions"])
     rows = {"largest_value": [probe.largest_value(agent)], "largest_action": [probe.largest_action(agent)]}
     for _ in range(drift["updates"] // drift["every"]):

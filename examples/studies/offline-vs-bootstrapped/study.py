@@ -1,4 +1,4 @@
-"""DDPG from an exploration tree, with and without rollouts of its own: [Matheron2020] 4.2 to 4.6."""
+"""DDPG from an exploration tree, with and without rollouts of its own: [Matheron2020] 4.2 to 4.7."""
 
 from typing import Any
 
@@ -16,26 +16,55 @@ from pbcs_ompl.studies.stacked_training import LoopSettings, StackedTraining, so
 
 GRID = 60
 """Cells of the pictures along each axis."""
+HALF_WALL = 0.05
+"""Half the thickness of a wall: so far the outer walls reach into the maze."""
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
-    """One run for each stack of each variant."""
-    common = {key: sweep[key] for key in ("evaluate_every", "episode_steps")}
-    return [{"name": f"{variant}-{chunk[0]}-{chunk[-1]}", "variant": variant, "seeds": chunk, **common, **options,
-             "agent": sweep["agent"] | options.get("agent", {})}
-            for variant, options in sweep["variants"].items() for chunk in chunks(seeds, sweep["stack"])]
+    """One run for each stack of each variant, and one that looks at mini-batches."""
+    common = {key: sweep[key] for key in ("evaluate_every", "episode_steps", "device")}
+    stacks = [{"name": f"{variant}-{chunk[0]}-{chunk[-1]}", "variant": variant, "seeds": chunk, **common, **options,
+               "agent": sweep["agent"] | options.get("agent", {})}
+              for variant, options in sweep["variants"].items() for chunk in chunks(seeds, sweep["stack"])]
+    return [*stacks, {"name": f"mini-batch-{seeds}", "variant": "mini-batch", "seeds": list(range(seeds)),
+                      **sweep["mini_batch"]}]
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
-    """Explore, train, and take down what became of the first seed's critic."""
+    """Explore, train, and take down what became of the first seed's critic; or look at mini-batches."""
     model = make("pbcs/Maze-v0", {"size": settings["size"], "wall_penalty": -1.0, "terminate_on_success": False})
-    agent = DDPG(model.observation_size, model.action_low, model.action_high, seeds=settings["seeds"],
+    if settings["variant"] == "mini-batch":
+        return settings | _mini_batches(model, settings["seeds"], settings["explored"], settings["count"])
+    agent, curves = _trained(model, settings, settings["seeds"], settings["steps"])
+    pictures = [_picture(agent, model, settings["episode_steps"]) | {"steps": settings["steps"]}]
+    for steps in settings.get("pictured", []):
+        # A seed does alone what it does in the stack: this is what it was like on its way.
+        earlier, _ = _trained(model, settings, settings["seeds"][:1], steps)
+        pictures.append(_picture(earlier, model, settings["episode_steps"]) | {"steps": steps})
+    kept = {key: settings[key] for key in ("variant", "seeds", "size", "figure", "explored", "updates", "steps")}
+    return {**kept, **curves, "pictures": pictures}
+
+
+def _trained(model: ResetAnywhere, settings: dict[str, Any], seeds: list[int],
+             steps: int) -> tuple[StackedAgent, dict[str, Any]]:
+    agent = DDPG(model.observation_size, model.action_low, model.action_high, seeds=seeds, device=settings["device"],
                  settings=DDPGSettings(**settings["agent"]))
     if settings["explored"]:
         _fill(agent, model, settings["explored"])
-    curves = _offline(agent, model, settings) if settings["updates"] else _with_rollouts(agent, model, settings)
-    kept = {key: settings[key] for key in ("variant", "seeds", "size", "figure", "explored", "updates", "steps")}
-    return {**kept, **curves, "picture": _picture(agent, model, settings["episode_steps"])}
+    return agent, _offline(agent, model, settings) if settings["updates"] else _with_rollouts(agent, model, settings,
+                                                                                              steps)
+
+
+def _mini_batches(model: ResetAnywhere, seeds: list[int], explored: int, count: int) -> dict[str, Any]:
+    """Count the transitions that a wall stopped, and those that an inner one stopped; draw one mini-batch."""
+    found = [explore(model, explored, seed + 1) for seed in seeds]
+    low, high = model.state_low + HALF_WALL, model.state_high - HALF_WALL
+    stopped = [one.rewards < 0.0 for one in found]
+    inner = [hit & ((one.states + one.controls > low) & (one.states + one.controls < high)).all(axis=1)
+             for one, hit in zip(found, stopped, strict=True)]
+    rows = np.random.default_rng(0).integers(explored, size=count)
+    return {"stopped": [int(hits.sum()) for hits in stopped], "stopped_inside": [int(hits.sum()) for hits in inner],
+            "batch": [found[0].states[rows].tolist(), found[0].next_states[rows].tolist()]}
 
 
 def _fill(agent: StackedAgent, model: ResetAnywhere, count: int) -> None:
@@ -55,8 +84,8 @@ def _offline(agent: StackedAgent, model: ResetAnywhere, settings: dict[str, Any]
     return {"at": [every * (row + 1) for row in range(len(success))], "success": success}
 
 
-def _with_rollouts(agent: StackedAgent, model: ResetAnywhere, settings: dict[str, Any]) -> dict[str, Any]:
-    loop = LoopSettings(settings["steps"], episode_steps=settings["episode_steps"],
+def _with_rollouts(agent: StackedAgent, model: ResetAnywhere, settings: dict[str, Any], steps: int) -> dict[str, Any]:
+    loop = LoopSettings(steps, episode_steps=settings["episode_steps"],
                         evaluate_every=settings["evaluate_every"])
     curves = StackedTraining(model, agent, EpsilonGreedy(0.1), loop).run()
     return {"at": curves.steps, "success": np.array(curves.success).astype(int).tolist()}

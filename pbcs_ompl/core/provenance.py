@@ -1,0 +1,35 @@
+"""What made a result: the versions of the libraries, Python and the machine."""
+
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+PACKAGES = ("pbcs-ompl", "ompl", "numpy", "scipy", "numba", "gymnasium", "python-fcl", "torch", "mujoco")
+
+
+def installed(packages: tuple[str, ...]) -> dict[str, str]:
+    """Return the versions of those packages that are installed."""
+    found = {}
+    for package in packages:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def provenance() -> dict[str, str]:
+    """Return the versions of this process, Python and the machine, as words."""
+    return {**installed(PACKAGES), "python": platform.python_version(), "system": platform.platform(),
+            "processor": f"{_processor()}, {os.cpu_count()} logical cores"}
+
+
+def _processor() -> str:
+    """Return the processor's name; `platform.processor` knows none on most Linux machines."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()

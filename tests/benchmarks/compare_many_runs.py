@@ -1,0 +1,72 @@
+"""10 000 recorded runs: how long it takes to list, read and merge them, and how much memory.
+
+    python tests/benchmarks/compare_many_runs.py
+"""
+
+import json
+import random
+import re
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from pbcs_ompl.bridge.coverage import log_spaced
+from pbcs_ompl.compare import read_comparison
+from pbcs_ompl.compare.benchmark_log import write_logs
+from pbcs_ompl.compare.database import write_database
+from pbcs_ompl.compare.records import record_file
+from pbcs_ompl.compare.run import Job, broken
+from pbcs_ompl.compare.sweep import Sweep, make_sweep
+from pbcs_ompl.core.run_folder import CONFIG, to_toml, write_text
+
+PLANNERS, SIZES, SEEDS = ("Ex", "RRTNH", "EST", "KPIECE1"), range(2, 12), 250
+LIMIT_SECONDS, LIMIT_MEGABYTES = 20.0, 500.0
+
+
+def record(job: Job, rng: random.Random) -> dict:
+    """Return what a run could have recorded, with a curve of some 55 points; one run in ten is not solved."""
+    transitions = rng.randint(10_000, 1_000_000)
+    points = log_spaced(transitions).tolist()
+    return {**broken(job, "made up"), "solved": rng.random() < 0.9, "transitions": transitions, "seconds": rng.random(),
+            "collision_checks": transitions + 1, "nodes": transitions, "path_length": 300, "replay_ok": True,
+            "memory": 250.0, "coverage": rng.random(),
+            "progress": {"transitions": points, "seconds": sorted(rng.random() for _ in points),
+                         "coverage": sorted(rng.random() for _ in points)}}
+
+
+def write_records(folder: Path, sweep: Sweep) -> int:
+    """Write a record for every run of the sweep; return how many."""
+    rng, jobs = random.Random(0), list(sweep.jobs())
+    for job in jobs:
+        file = record_file(folder, job.name)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(record(job, rng), indent=2))
+    write_text(folder / CONFIG, to_toml(sweep.config()))
+    return len(jobs)
+
+
+def peak_megabytes() -> float:
+    return int(re.search(r"VmHWM:\s*(\d+)", Path("/proc/self/status").read_text())[1]) * 1024 / 1e6
+
+
+def main() -> int:
+    sweep = make_sweep(PLANNERS, "pbcs/Maze-v0", [{"size": size} for size in SIZES], SEEDS, 1_000_000, None, None)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        count = write_records(folder, sweep)
+        began = time.perf_counter()
+        found = read_comparison(folder)
+        merged = time.perf_counter()
+        write_database(folder / "comparison.db", write_logs(folder, sweep, found.runs))
+        ended = time.perf_counter()
+    seconds, megabytes = ended - began, peak_megabytes()
+    print(f"{count} records: listed, read and merged in {merged - began:.1f} s, logs and database in "
+          f"{ended - merged:.1f} s; peak of the process {megabytes:.0f} MB")
+    ok = seconds < LIMIT_SECONDS and megabytes < LIMIT_MEGABYTES
+    print(f"{'reached' if ok else 'MISSED'}: under {LIMIT_SECONDS:.0f} s and {LIMIT_MEGABYTES:.0f} MB")
+    return 0 if ok else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

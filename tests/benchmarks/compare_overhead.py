@@ -1,0 +1,80 @@
+"""What the runner of comparisons costs: its overhead over the runs' own time, and what a second worker brings.
+
+    python tests/benchmarks/compare_overhead.py [RUNS]
+
+The runs last at least 0.5 s each: EST in a large maze, stopped by its budget. Their own time is that of the same calls
+of `plan`, one after the other in this process. The rest of a comparison's wall time is overhead: coverage, records,
+telling the parent, the database; and once the start of the process, its imports and compilers, which is shown apart. So
+is the time beside the search alone, most of which `plan` takes to read the tree out of OMPL. Needs two cores that
+nobody else uses.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pbcs_ompl.bridge.plan import plan
+from pbcs_ompl.compare import compare
+
+RUNS = 20
+ENV, MAZE, PLANNER, TRANSITIONS = "pbcs/Maze-v0", {"size": 15, "maze_seed": 1}, "EST", 50_000
+LEAST_SECONDS, MOST_OVERHEAD, LEAST_GAIN = 0.5, 0.10, 1.8
+
+
+class Timing(NamedTuple):
+    """Wall seconds of a comparison."""
+
+    whole: float
+    """All of it."""
+    after_first: float
+    """From the end of the first run on."""
+    searches: list[float]
+    """What the searches took, the first one's first."""
+
+
+def measure(runs: int, jobs: int) -> Timing:
+    """Compare one planner with so many seeds, as a user does, and look at the clock."""
+    ends: list[float] = []
+
+    def look(numbers: dict[str, Any]) -> None:
+        if numbers["runs"]:
+            ends.append(time.perf_counter())
+
+    with tempfile.TemporaryDirectory() as folder:
+        began = time.perf_counter()
+        found = compare([PLANNER], ENV, env_kwargs=MAZE, seeds=runs, max_transitions=TRANSITIONS, jobs=jobs,
+                        out=Path(folder) / "out", on_progress=look)
+        ended = time.perf_counter()
+    return Timing(ended - began, ended - ends[0], [record["seconds"] for record in found.runs])
+
+
+def plain(runs: int) -> float:
+    """Return the seconds of the same runs, but the first, in a loop."""
+    plan(ENV, PLANNER, env_kwargs=MAZE, seed=0, max_transitions=TRANSITIONS)
+    began = time.perf_counter()
+    for seed in range(1, runs):
+        plan(ENV, PLANNER, env_kwargs=MAZE, seed=seed, max_transitions=TRANSITIONS)
+    return time.perf_counter() - began
+
+
+def main(runs: int = RUNS) -> int:
+    """Measure, print, and say whether the bars are reached."""
+    own, one, two = plain(runs), measure(runs, 1), measure(2 * runs, 2)
+    overhead = one.after_first / own - 1
+    print(f"one worker: {runs} runs with searches of {min(one.searches):.2f} to {max(one.searches):.2f} s; "
+          f"overhead {overhead:.1%} of the runs' own time")
+    print(f"            over the searches alone {one.after_first / sum(one.searches[1:]) - 1:.1%}, "
+          f"with the start of the process {one.whole / sum(one.searches) - 1:.1%}")
+    gain = (2 * runs - 2) / two.after_first / ((runs - 1) / one.after_first)
+    print(f"two workers: {gain:.2f} times the throughput of one, "
+          f"{2 * one.whole / two.whole:.2f} times with the start of the processes")
+    ok = overhead < MOST_OVERHEAD and gain >= LEAST_GAIN and min(one.searches) >= LEAST_SECONDS
+    print(f"{'reached' if ok else 'MISSED'}: overhead under {MOST_OVERHEAD:.0%} for runs of at least "
+          f"{LEAST_SECONDS} s, two workers at least {LEAST_GAIN} times one")
+    return 0 if ok else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(*map(int, sys.argv[1:])))
