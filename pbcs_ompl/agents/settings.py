@@ -1,6 +1,7 @@
 """The settings that every algorithm has; each adds its own in a subclass of `AgentSettings`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
 from pbcs_ompl.agents.presets import make_settings, preset
@@ -34,7 +35,11 @@ class AgentSettings:
     replay_capacity: int = 1_000_000
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "hidden", tuple(self.hidden))
+        if isinstance(self.hidden, list):
+            object.__setattr__(self, "hidden", tuple(self.hidden))
+        for field in fields(self):
+            kind = type(field.default)
+            self._require(field.name, _is_a(kind, getattr(self, field.name)), f"a value of the kind {kind.__name__}")
         widths = [isinstance(width, int) and width > 0 for width in self.hidden]
         self._require("hidden", bool(widths) and all(widths), "positive whole numbers")
         for name in ("actor_learning_rate", "critic_learning_rate"):
@@ -46,7 +51,7 @@ class AgentSettings:
 
     def _require(self, name: str, holds: bool, expected: str) -> None:
         if not holds:
-            raise InvalidOption(f"{name} is {getattr(self, name)}, expected {expected}")
+            raise InvalidOption(f"{name} is {getattr(self, name)!r}, expected {expected}")
 
     @classmethod
     def from_preset(cls, name: str, **changes: Any) -> Self:
@@ -57,3 +62,9 @@ class AgentSettings:
             InvalidOption: no such setting, or a value out of its range.
         """
         return make_settings(cls, preset(name, cls.algorithm) | changes)
+
+
+def _is_a(kind: type, value: Any) -> bool:
+    """Tell whether a value may stand where one of this kind is expected: a whole number for any number, too."""
+    wider: dict[type, type] = {float: Real, int: Integral}
+    return isinstance(value, wider.get(kind, kind)) and isinstance(value, bool) == (kind is bool)

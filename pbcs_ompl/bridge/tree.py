@@ -79,9 +79,10 @@ def tree_of(planner: Any, model: ResetAnywhere, space_information: Any) -> TreeA
     planner.getPlannerData(data)
     read = state_reader(blocks(len(model.state_low), model.feature_dims))
     size = data.numVertices()
-    numbers, parents = array("d"), np.full(size, -1, dtype=np.int64)
+    numbers, parent_of = array("d"), [-1] * size
     for node in range(size):
         numbers.extend(read(data.getVertex(node).getState()))
-        if children := data.getEdges(node):  # asking for the incoming edges takes five times as long
-            parents[children] = node
-    return TreeArrays(np.frombuffer(numbers).reshape(size, len(model.state_low)), parents, None)
+        for child in data.getEdges(node):  # asking for the incoming edges takes five times as long
+            parent_of[child] = node
+    states = np.frombuffer(numbers).reshape(size, len(model.state_low))
+    return TreeArrays(states, np.array(parent_of, dtype=np.int64), None)

@@ -1,5 +1,6 @@
 """`pbcs compare`: planners x environments x seeds, as a table, pictures and a Planner Arena database."""
 
+import shlex
 from argparse import Namespace
 from itertools import groupby
 from pathlib import Path
@@ -60,7 +61,8 @@ def _closing_lines(summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
         lines += [("", _failure(row)) for row in chosen if row["failed"]]
         lines += [("pair", _pair(test)) for test in summary["tests"] if test["environment"] == place]
     return [*lines, ("files", list_files(out)),
-            ("next", f"DATABASE={summary['database']} plannerarena   (pip install 'pbcs-ompl[arena]')")]
+            ("next", f"pbcs report {shlex.quote(str(out))}"),
+            ("", f"DATABASE={summary['database']} plannerarena   (pip install 'pbcs-ompl[arena]')")]
 
 
 def _cells(row: dict[str, Any]) -> str:

@@ -1,13 +1,15 @@
 """`pbcs plan`: search a trajectory to the goal, draw the tree."""
 
+import shlex
 from argparse import Namespace
 from pathlib import Path
 
 from pbcs_ompl.bridge.plan import PlanResult, plan
-from pbcs_ompl.cli.folders import environment_words, fresh_folder
+from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.models import note_rules
 from pbcs_ompl.cli.pictures import draw_tree
 from pbcs_ompl.cli.terminal import Report, conclude, list_files
+from pbcs_ompl.core.command_words import environment_words
 from pbcs_ompl.core.wording import duration, short
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.reset_anywhere import make
@@ -38,7 +40,8 @@ def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[
     if result.solved:
         replay = "replays exactly" if result.replay_ok else "DOES NOT REPLAY (not deterministic?)"
         lines.append(("path", f"{short(result.path_length)} steps, {replay}"))
-        following = f"pbcs train {environment_words(arguments)} --path {out}"
+        environment = environment_words(arguments.env, arguments.env_kwargs)
+        following = shlex.join(["pbcs", "train", *environment, "--path", str(out)])
     else:
         following = "the same with a larger --max-transitions or --max-seconds, or another --planner"
     return [*lines, ("files", list_files(out)), ("next", following)]

@@ -1,5 +1,6 @@
 """`pbcs study`: run an experiment, draw its figures, say which of its claims the data agree with."""
 
+import shlex
 import sys
 from argparse import Namespace
 from pathlib import Path
@@ -95,4 +96,5 @@ def _closing_lines(title: str, summary: dict[str, Any], out: Path) -> list[tuple
         lines += [("", f"{name}: {in_words(value)}") for name, value in claim["numbers"].items()]
         lines += [("", claim["note"])] if claim["note"] else []
     lines += _failures(summary["failed"])
-    return [*lines, ("figures", ", ".join(summary["figures"]) or "none"), ("files", list_files(out))]
+    return [*lines, ("figures", ", ".join(summary["figures"]) or "none"), ("files", list_files(out)),
+            ("next", f"pbcs report {shlex.quote(str(out))}")]

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+from pbcs_ompl import execution
 from pbcs_ompl.compare.run import MEASURED, Record
+from pbcs_ompl.compare.sweep import Sweep
 from pbcs_ompl.core.errors import DamagedFile
-from pbcs_ompl.core.run_folder import read_json
 
 RUNS = "runs"
 
@@ -14,18 +15,24 @@ def record_file(folder: Path, name: str) -> Path:
     return folder / RUNS / f"{name}.json"
 
 
+def read_records(folder: Path, sweep: Sweep) -> dict[str, Record]:
+    """Return the records that are there, by the names of their runs.
+
+    Raises:
+        DamagedFile: see `read_record`.
+    """
+    names = [job.name for job in sweep.jobs()]
+    return {name: read_record(folder, name) for name in names if record_file(folder, name).is_file()}
+
+
 def read_record(folder: Path, name: str) -> Record:
     """Return the record of the run `name`.
 
     Raises:
-        DamagedFile: it does not parse, or is not the record of this run. It is never made again unasked: what made
-            it wrong may have been at the other records too.
+        DamagedFile: it does not parse, or is not the record of this run.
     """
     file = record_file(folder, name)
-    try:
-        record = read_json(file)
-    except DamagedFile as error:
-        raise DamagedFile(f"{error}; remove the file to have this run made again") from error
-    if not isinstance(record, dict) or record.get("name") != name or not record.keys() >= {*MEASURED, "solved"}:
+    record = execution.read_record(file)
+    if record.get("name") != name or not record.keys() >= {*MEASURED, "solved"}:
         raise DamagedFile(f"{file} is not the record of the run {name}; remove the file to have this run made again")
     return record

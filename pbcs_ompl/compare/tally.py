@@ -23,7 +23,7 @@ class Tally:
         self._sweep, self._tell = sweep, on_progress
         self._labels = {sweep.folder(number): place.label for number, place in enumerate(sweep.environments, start=1)}
         self._transitions: dict[tuple[str, str], list[int]] = {key: [] for key in product(self._labels, sweep.planners)}
-        self._solved = dict.fromkeys(self._transitions, 0)
+        self._solved, self._ended = dict.fromkeys(self._transitions, 0), dict.fromkeys(self._transitions, 0)
 
     def add_all(self, records: Iterable[Record]) -> None:
         """Count records that were there before."""
@@ -40,6 +40,7 @@ class Tally:
         key = folder_of(record), record["planner"]
         self._transitions[key].append(censored(record, self._sweep.max_transitions))
         self._solved[key] += record["solved"]
+        self._ended[key] += record["seconds"] is not None
 
     def _report(self) -> None:
         if self._tell is not None:
@@ -52,4 +53,4 @@ class Tally:
         environment = {"environment": self._labels[folder]} if len(self._labels) > 1 else {}
         return {**environment, "planner": planner,
                 "runs": f"{len(numbers)}/{len(self._sweep.seeds)}", "solved": self._solved[key],
-                "median transitions": median(numbers) if numbers else "-"}
+                "median transitions": median(numbers) if self._ended[key] else "-"}

@@ -25,7 +25,7 @@ class FolderLock:
         self._path = path
         how = (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | (0 if wait else fcntl.LOCK_NB)
         while True:
-            self._file = open(path, "w")  # noqa: SIM115 - held for the life of the lock
+            self._file = open(path, "a+")  # noqa: SIM115 - held for its life; NFS shares locks of readers only
             try:
                 fcntl.flock(self._file, how)
             except BlockingIOError as error:

@@ -6,6 +6,9 @@ import sys
 
 from pbcs_ompl.core.errors import MissingDependency
 
+LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
+"""What renders without a display, by the value of MUJOCO_GL."""
+
 
 def prefer_headless_rendering() -> None:
     """On Linux without a display, let MuJoCo render through EGL where it is installed, unless MUJOCO_GL is set.
@@ -16,6 +19,12 @@ def prefer_headless_rendering() -> None:
         return
     if sys.platform == "linux" and not os.environ.get("DISPLAY") and ctypes.util.find_library("EGL"):
         os.environ.setdefault("MUJOCO_GL", "egl")
+
+
+def renderer_is_missing() -> bool:
+    """Return whether MUJOCO_GL names a library that is not there: MuJoCo then fails when it is imported."""
+    library = LIBRARIES.get(os.environ.get("MUJOCO_GL", "").lower())
+    return library is not None and ctypes.util.find_library(library) is None
 
 
 def check_can_render() -> None:

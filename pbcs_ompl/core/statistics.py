@@ -1,7 +1,5 @@
 """Success rates with their uncertainty."""
 
-from scipy.stats import binomtest
-
 
 def wilson(successes: int, trials: int) -> tuple[float, float]:
     """Return the 95 % Wilson score interval of a success rate; (0, 1) when nothing was tried.
@@ -10,5 +8,7 @@ def wilson(successes: int, trials: int) -> tuple[float, float]:
     """
     if trials == 0:
         return 0.0, 1.0
+    from scipy.stats import binomtest  # takes longer to load than all else that a worker process needs
+
     interval = binomtest(successes, trials).proportion_ci(method="wilson")
     return float(interval.low), float(interval.high)

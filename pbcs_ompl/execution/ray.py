@@ -102,8 +102,10 @@ def _connection(ray: ModuleType, address: str) -> Iterator[None]:
     try:
         _knock(address)
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")
-    except (OSError, ValueError, RuntimeError) as error:
+    except (OSError, ValueError) as error:
         raise InvalidOption(f"no Ray cluster at {address!r}: {error}; start one with: ray start --head") from error
+    except RuntimeError as error:  # another Ray, or another Python
+        raise Mismatch(f"cannot join the Ray cluster at {address!r}: {' '.join(str(error).split())}") from error
     try:
         yield
     finally:

@@ -44,6 +44,8 @@ def values_figure(values: Mapping[str, Mapping[str, Sequence[float]]], *, title:
     places = _places(axes, values)
     for index, (name, groups) in enumerate(values.items()):
         filled = {at: groups[group] for group, at in places[name].items() if len(groups[group])}
+        if not filled:
+            continue
         for at, column in filled.items():
             axes.plot(np.full(len(column), at), column, ".", color=f"C{index}", alpha=0.45)
         axes.plot(list(filled), [np.median(column) for column in filled.values()], "_", color=f"C{index}",
@@ -66,7 +68,7 @@ def _places(axes: Axes, series: Mapping[str, Mapping[str, object]]) -> dict[str,
 
 
 def _range(counts: Sequence[int]) -> str:
-    low, high = min(counts, default=0), max(counts, default=0)
+    low, high = min(counts), max(counts)
     return str(low) if low == high else f"{low} to {high}"
 
 
@@ -75,4 +77,5 @@ def _finish(figure: Figure, axes: Axes, title: str, xlabel: str, ylabel: str) ->
     axes.set_xlabel(xlabel)
     axes.set_ylabel(ylabel)
     axes.grid(alpha=0.3, axis="y")
-    figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    if axes.get_legend_handles_labels()[0]:
+        figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from pbcs_ompl.core.command_words import environment_words, json_words
 from pbcs_ompl.core.registry import names
 from pbcs_ompl.core.run_folder import plain, read_json, read_toml
 from pbcs_ompl.report.folder import Folder
@@ -13,6 +14,7 @@ from pbcs_ompl.reset_anywhere.make import is_known
 from pbcs_ompl.studies.study import SWEEP, study_folders
 
 Words = list[str]
+BUDGET = ("max_transitions", "max_seconds", "max_memory")
 PLAN, TRAJECTORY, CHECKPOINT = "plan.json", "trajectory.npz", "checkpoint.npz"
 
 
@@ -38,13 +40,6 @@ def going_on(folder: Folder) -> str:
     if folder.kind in ("comparison", "study") and folder.result is None and repeating(folder).startswith("pbcs "):
         return f"{repeating(folder)} {shlex.join(['--out', str(folder.path)])}"
     return ""
-
-
-def environment_words(env: str, env_kwargs: dict[str, Any]) -> Words:
-    """Return the options that name one environment. Its own rules are options of their own."""
-    options = {name: value for name, value in env_kwargs.items() if not name.startswith("--")}
-    rules = [f"{name}={value}" for name, value in env_kwargs.items() if name.startswith("--")]
-    return ["--env", env, *_json("--env-kwargs", options), *rules]
 
 
 def _at_hand(folder: Folder) -> bool:
@@ -76,7 +71,7 @@ def _words(folder: Folder) -> Words:
 def _plan(folder: Folder) -> Words:
     config = folder.config
     return ["plan", *environment_words(config["env"], config["env_kwargs"]), "--planner", config["planner"],
-            *_json("--planner-kwargs", config["planner_kwargs"]), "--seed", str(config["seed"]), *_budget(config)]
+            *json_words("--planner-kwargs", config["planner_kwargs"]), "--seed", str(config["seed"]), *_budget(config)]
 
 
 def _training(folder: Folder) -> Words:
@@ -85,11 +80,11 @@ def _training(folder: Folder) -> Words:
         planning = ["--path", str(folder.path / TRAJECTORY)]  # it was given: no planner finds one without a transition
     else:
         planning = ["--planner", config.get("planner", "Ex"),
-                    *_json("--planner-kwargs", config.get("planner_kwargs", {}))]
+                    *json_words("--planner-kwargs", config.get("planner_kwargs", {}))]
     named = [word for name in ("method", "agent", "preset", "device", "seed")
              for word in (f"--{name}", str(config[name]))]
     return ["train", *environment_words(config["env"], config["env_kwargs"]), *planning, *named,
-            *_json("--settings", config["settings"]), *_json("--agent-settings", config["agent_settings"]),
+            *json_words("--settings", config["settings"]), *json_words("--agent-settings", config["agent_settings"]),
             *_budget(config)]
 
 
@@ -106,7 +101,7 @@ def _comparison(folder: Folder) -> Words:
     else:
         environments = ["--env", *(place["env"] for place in places),
                         "--env-kwargs", *(json.dumps(place["env_kwargs"], default=plain) for place in places)]
-    return ["compare", "--planners", *config["planners"], *_json("--planner-kwargs", options), *environments,
+    return ["compare", "--planners", *config["planners"], *json_words("--planner-kwargs", options), *environments,
             "--seeds", str(len(config["seeds"])), *_budget(config)]
 
 
@@ -117,8 +112,9 @@ def _study(folder: Folder) -> Words:
     seeds = ["--seeds", str(config["seeds"])] if "seeds" in config else []
     places = [(name, place) for name, place in study_folders().items() if name == config["study"]]
     places += [(config["folder"], Path(config["folder"]))] if "folder" in config else []
-    words = [word for word, place in places if (place / SWEEP).is_file() and _sweep(place) == sweep]
-    return ["study", words[0], *seeds] if words else []
+    device = {key: sweep[key] for key in ("device",) if key in sweep}  # the only value that an option replaces
+    words = [word for word, place in places if (place / SWEEP).is_file() and _sweep(place) | device == sweep]
+    return ["study", words[0], *seeds, *(word for key in device for word in (f"--{key}", device[key]))] if words else []
 
 
 def _sweep(place: Path) -> dict[str, Any]:
@@ -129,8 +125,8 @@ def _comparison_script(config: dict[str, Any]) -> str:
     """Return the script of a comparison that the command line cannot name."""
     places = config["environments"]
     planners = {name: config["planner_kwargs"].get(name, {}) for name in config["planners"]}
-    budget = {name: config[name] for name in ("max_transitions", "max_seconds", "max_memory") if name in config}
-    settings = {"env_kwargs": [place["env_kwargs"] for place in places], "seeds": config["seeds"], **budget}
+    settings = {"env_kwargs": [place["env_kwargs"] for place in places]}
+    settings |= {name: config[name] for name in ("seeds", *BUDGET) if name in config}
     lines = [f"            {name}={value!r}," for name, value in settings.items()]
     return "\n".join(["from pbcs_ompl.compare import compare", "", 'if __name__ == "__main__":',
                       f"    compare({planners!r},", f"            {[place['env'] for place in places]!r},", *lines,
@@ -138,10 +134,5 @@ def _comparison_script(config: dict[str, Any]) -> str:
 
 
 def _budget(config: dict[str, Any]) -> Words:
-    return [word for name in ("max_transitions", "max_seconds", "max_memory") if name in config
+    return [word for name in BUDGET if name in config
             for word in (f"--{name.replace('_', '-')}", str(config[name]))]
-
-
-def _json(name: str, values: dict[str, Any]) -> Words:
-    """Return an option whose value is a JSON object; nothing where that is empty."""
-    return [name, json.dumps(values, default=plain)] if values else []

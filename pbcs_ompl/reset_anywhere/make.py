@@ -1,6 +1,7 @@
 """Make an environment by id, with errors that name the closest id or option."""
 
 import inspect
+import os
 from contextlib import redirect_stderr
 from importlib import import_module
 from io import StringIO
@@ -12,7 +13,7 @@ from gymnasium.envs.registration import EnvSpec, load_env_creator
 from pbcs_ompl.core.contracts import ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, UnknownName, did_you_mean
 from pbcs_ompl.core.registry import load_environments
-from pbcs_ompl.core.rendering import prefer_headless_rendering
+from pbcs_ompl.core.rendering import prefer_headless_rendering, renderer_is_missing
 from pbcs_ompl.reset_anywhere.adapt import adapt
 from pbcs_ompl.reset_anywhere.model import FEATURE_KEY, GOAL_KEY, START_KEY
 from pbcs_ompl.reset_anywhere.rules import FeatureRule, GoalRule
@@ -52,6 +53,11 @@ def make(env_id: str, env_kwargs: dict[str, Any] | None = None, *, goal: str | G
         extra = "robotics" if env_id.startswith(ROBOTICS) else "mujoco"
         remedy = f" (pip install 'pbcs-ompl[{extra}]')" if "mujoco" in str(error).lower() else ""
         raise MissingDependency(f"environment {env_id!r} needs what is not installed: {error}{remedy}") from error
+    except (AttributeError, RuntimeError) as error:  # so mujoco fails on import
+        if not renderer_is_missing() and "MUJOCO_GL" not in str(error):
+            raise
+        raise MissingDependency(f"mujoco cannot be imported with MUJOCO_GL={os.environ['MUJOCO_GL']}: install what it "
+                                f"names, set MUJOCO_GL=egl, or unset it") from error
     except AssertionError as error:
         if not env_id.startswith(KNOWN_TO_FAIL):
             raise

@@ -61,7 +61,7 @@ class Model:
 
     def feature(self, states: Array) -> Array:
         """Return the features [B, F] of states [B, D]: a copy of the feature dimensions."""
-        return np.asarray(states)[:, self._dims]
+        return np.asarray(states).take(self._dims, axis=1)
 
     def distance(self, states: Array, others: Array) -> Array:
         """Return the distances [B] between states [B, D] and others [B, D] or [D]: the environment's, else Euclid's."""

@@ -97,6 +97,11 @@ class MujocoEnv(RestorableEnv):
         seen = agent._get_obs()
         return self.inner._get_obs(seen[0] if isinstance(seen, tuple) else seen)
 
+    def render(self) -> Any:
+        """Render the environment; a camera that follows the robot is where the restored robot is."""
+        self._mujoco.mj_camlight(self.inner.model, self.inner.data)
+        return self.inner.render()
+
     def told_distance(self, outcome: Outcome) -> float | None:
         """Return the distance between achieved and desired goal, where they are points."""
         if not isinstance(outcome.observation, dict) or not self._has_goal:

@@ -5,8 +5,10 @@ from typing import Any
 
 import gymnasium
 
+from pbcs_ompl.bridge.building import PlannerSpec
+from pbcs_ompl.bridge.problem import make_problem, quiet_ompl
 from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.core.contracts import ProgressCallback, ResetAnywhere
+from pbcs_ompl.core.contracts import Counter, ProgressCallback, ResetAnywhere
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, RunFolderError, TrainingStalled, UnknownName
 from pbcs_ompl.core.run_folder import CONFIG, RESULT, RunFolder, read_toml
 from pbcs_ompl.reset_anywhere import make, open_model
@@ -44,6 +46,8 @@ def train(env: str | gymnasium.Env | ResetAnywhere, *, env_kwargs: dict[str, Any
         if config.chooses_planner:
             raise InvalidOption("a trajectory is given, so nothing is planned; remove planner and planner_kwargs")
         trajectory.check_belongs_to(model)
+    elif config.chooses_planner:
+        _check_planner(model, config)
     if out is None:
         return _checked(Training(model, config, None, on_progress, False).run(trajectory))
     with RunFolder(out) as folder:
@@ -74,6 +78,12 @@ def resume(folder: str | Path, *, max_transitions: int | None = None,
         if max_transitions:
             opened.write_config(values)
         return _checked(Training(make(env, env_kwargs), config, opened, on_progress, True).run(None))
+
+
+def _check_planner(model: ResetAnywhere, config: TrainConfig) -> None:
+    """Build the planner once, so that what it refuses is refused before a folder is made."""
+    with quiet_ompl(), make_problem(model, seed=config.seed, counter=Counter()) as problem:
+        PlannerSpec(config.planner, config.planner_kwargs).build(problem.space_information, config.seed)
 
 
 def _checked(result: TrainResult) -> TrainResult:

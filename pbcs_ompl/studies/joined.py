@@ -28,8 +28,10 @@ def joined_success(records: Sequence[dict[str, Any]], steps: int, every: int) ->
 
 
 def joined_rows(records: Sequence[dict[str, Any]], name: str, count: int) -> Array:
-    """Return "success" or "rewarded" of all stacks at `count` evaluations [E, S]; the last row of a stack that ended
-    early is repeated."""
+    """Return rows, such as "success" or "rewarded", of all stacks at `count` evaluations [E, S].
+
+    The last row of a stack that ended early is repeated.
+    """
     return np.concatenate([_filled(record[name], count) for record in records], axis=1)
 
 

@@ -41,13 +41,21 @@ def run_settings(study: Study, seeds: int) -> list[Settings]:
     """Return the settings of every run.
 
     Raises:
-        PbcsError: there are none, or their names do not serve as names of files.
+        PbcsError: there are none, their names do not serve as names of files, or they are not plain values.
     """
     settings = study.runs(study.sweep, seeds)
-    names = [str(one["name"]) for one in settings]
-    if not names or len(set(names)) < len(names) or any("/" in name or not name.isprintable() for name in names):
+    names = [str(one.get("name", "")) for one in settings]
+    if not names or len(set(names)) < len(names) or not all(map(_names_a_file, names)):
         raise PbcsError(f"the runs of a study need names of their own, without slashes; got {names[:5]}")
+    try:
+        json.dumps(settings, default=plain)
+    except TypeError as error:
+        raise PbcsError(f"the settings of the runs of {study.id} must be plain values: {error}") from error
     return settings
+
+
+def _names_a_file(name: str) -> bool:
+    return bool(name) and "/" not in name and name.isprintable()
 
 
 def record_name(settings: Settings) -> str:

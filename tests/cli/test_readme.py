@@ -77,6 +77,6 @@ def test_the_first_forty_lines_hold_what_a_visitor_needs():
 def test_every_folder_of_the_overview_exists():
     tree = next(block for block in blocks(README, "") if "reset_anywhere/" in block)
     parents = {"core", "reset_anywhere", "bridge", "agents", "skills", "compare", "diagnostics", "studies", "execution",
-               "figures", "cli"}
+               "figures", "report", "cli"}
     for name in re.findall(r"^\s*(\w+)/", tree, flags=re.MULTILINE):
         assert (ROOT / ("pbcs_ompl" if name in parents else "") / name).is_dir(), name

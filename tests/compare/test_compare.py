@@ -11,7 +11,7 @@ import time
 import pytest
 
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.compare import compare, comparison, read_comparison
+from pbcs_ompl.compare import compare, read_comparison, runner
 from pbcs_ompl.compare.sweep import Sweep, make_sweep
 from pbcs_ompl.core.errors import (
     DamagedFile,
@@ -51,7 +51,7 @@ def test_warm_workers_give_the_results_of_a_fresh_process(tmp_path):
 
 def test_every_run_of_a_planner_that_misbehaves_is_recorded_and_the_others_go_on(misbehaving, tmp_path, monkeypatch):
     """One that dies, raises, cannot be built, hangs so that Python stands still, or eats memory."""
-    monkeypatch.setattr(comparison, "SECONDS_OF_GRACE", 2.0)
+    monkeypatch.setattr(runner, "SECONDS_OF_GRACE", 2.0)
     reasons = {"misbehaving:Deadly": "the process died", "misbehaving:Broken": "RuntimeError: this planner is broken",
                "SST": "cannot build SST", "misbehaving:Hanging": "stopped from outside after 3 s",
                "misbehaving:Hungry": "the limit of one run is 700"}
@@ -75,7 +75,7 @@ def unavailable(monkeypatch):
     def refuse(name, options):
         raise PlannerUnavailable(f"{name} has no constructor")
 
-    monkeypatch.setattr(comparison, "PlannerSpec", refuse)
+    monkeypatch.setattr(runner, "PlannerSpec", refuse)
 
 
 def test_planner_that_cannot_be_loaded_is_recorded_without_a_process(unavailable):
@@ -94,11 +94,11 @@ def test_killed_comparison_resumes(misbehaving, tmp_path):
                "if __name__ == '__main__':\n    compare(**json.loads(sys.argv[1]))\n")
     (tmp_path / "main.py").write_text(program)
     process = subprocess.Popen([sys.executable, str(tmp_path / "main.py"), json.dumps(settings)])
-    wait_until(lambda: told.exists() and told.read_text())
+    record = out / "runs/1-Maze-v0/ompl.control.RRT-0.json"
+    wait_until(lambda: told.exists() and told.read_text() and record.exists())
     process.kill()
     process.wait()
     wait_until(lambda: not alive(int(told.read_text())))
-    record = out / "runs/1-Maze-v0/ompl.control.RRT-0.json"
     assert list(record.parent.iterdir()) == [record]
     assert len(read_comparison(out).runs) == 1
     with pytest.raises(RunFolderError, match="max_seconds"):
@@ -198,3 +198,11 @@ def test_a_sweep_survives_its_config(tmp_path):
     assert Sweep.from_config(read_toml(tmp_path / "config.toml")) == sweep
     names = [job.name for job in sweep.jobs()]
     assert len(set(names)) == len(names) == 8
+
+
+def test_a_folder_of_something_else_is_no_comparison(tmp_path):
+    plan(MAZE, RRT, env_kwargs={"size": 2}, max_transitions=10, out=tmp_path / "out")
+    with pytest.raises(DamagedFile, match="holds no comparison"):
+        read_comparison(tmp_path / "out")
+    with pytest.raises(DamagedFile, match="does not exist"):
+        read_comparison(tmp_path / "nowhere")

@@ -167,7 +167,9 @@ def test_devices_that_are_not_there_are_named(entry):
             entry(2, [-1.0], [1.0], device="cuda")
 
 
-@pytest.mark.parametrize("wrong", [{"discount": 1.0}, {"hidden": ()}, {"batch_size": 0}, {"polyak": 2.0}])
+@pytest.mark.parametrize("wrong", [
+    {"discount": 1.0}, {"discount": -0.1}, {"discount": float("nan")}, {"discount": "high"}, {"hidden": ()},
+    {"hidden": 64}, {"batch_size": 0}, {"batch_size": 2.5}, {"layer_norm": 1}, {"polyak": 2.0}, {"polyak": True}])
 def test_settings_out_of_range_are_named(entry, wrong):
     with pytest.raises(InvalidOption, match=next(iter(wrong))):
         entry.settings_type(**wrong)

@@ -10,6 +10,7 @@ import pytest
 from deeds import broken, do
 
 from pbcs_ompl.cli import main
+from pbcs_ompl.compare import compare
 from pbcs_ompl.core.errors import InvalidOption, Mismatch, MissingDependency
 from pbcs_ompl.execution import run_all
 from pbcs_ompl.execution.ray import ray_cluster
@@ -52,14 +53,14 @@ def test_a_lost_node_costs_no_run(cluster):
 
 @pytest.mark.slow
 def test_runs_that_go_wrong_cost_only_themselves_and_limits_hold(cluster):
-    jobs = [("square", 3), ("kill", 1), ("refuse", 2), ("sleep", 30), ("eat", 400), ("square", 4)]
+    jobs = [("square", 3), ("kill", 1), ("refuse", 2), ("sleep", 60), ("eat", 400), ("square", 4)]
     records = {(record["name"], record["value"]): record.get("reason", "")
-               for record in run(cluster, jobs, max_seconds=2.0, max_memory=300.0, workers=1)}
+               for record in run(cluster, jobs, max_seconds=6.0, max_memory=300.0, workers=1)}
     assert len(records) == len(jobs)
     assert records["square", 9] == records["square", 16] == ""
     assert records["kill", 1].startswith("the process died, Killed")
     assert records["refuse", 2].startswith("ValueError")
-    assert records["sleep", 30].startswith("stopped from outside after 2 s")
+    assert records["sleep", 60].startswith("stopped from outside after 6 s")
     assert "MB of memory" in records["eat", 400]
 
 
@@ -87,9 +88,31 @@ def test_what_the_docs_say_of_a_cluster_works(cluster, tmp_path, monkeypatch):
     assert len(names["result"].records) == 9
 
 
+@pytest.mark.slow
+def test_a_comparison_finds_there_what_it_finds_here(cluster):
+    cluster.add_node(**NODE)
+    settings = {"planners": ["Ex", "RRT"], "env": "pbcs/Maze-v0", "env_kwargs": {"size": 2}, "seeds": 3}
+    with ray_cluster(cluster.address) as executor:
+        there, again = (compare(**settings, jobs=executor).runs for _ in range(2))
+    found = [[{key: record[key] for key in ("planner", "seed", "solved", "transitions", "nodes", "path_length")}
+              for record in records] for records in (there, again, compare(**settings).runs)]
+    assert found[0] == found[1] == found[2]
+
+
 def test_an_address_without_a_cluster_is_named():
     pytest.importorskip("ray", reason="Ray is not installed: pip install 'pbcs-ompl[ray]'")
     with pytest.raises(InvalidOption, match="no Ray cluster at 'localhost:1': "), ray_cluster("localhost:1"):
+        pass
+
+
+def test_a_cluster_of_another_ray_is_named(monkeypatch):
+    ray = pytest.importorskip("ray", reason="Ray is not installed: pip install 'pbcs-ompl[ray]'")
+
+    def refuse(**_):
+        raise RuntimeError("Version mismatch: The cluster was started with:\n    Ray: 1.0")
+
+    monkeypatch.setattr(ray, "init", refuse)
+    with pytest.raises(Mismatch, match=r"cluster at 'auto': Version mismatch: .* with: Ray: 1\.0$"), ray_cluster():
         pass
 
 

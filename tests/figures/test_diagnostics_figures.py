@@ -5,7 +5,7 @@ import pytest
 
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.figures.canvas import save
-from pbcs_ompl.figures.diagnostics import curves_figure, slices_figure, success_figure
+from pbcs_ompl.figures.diagnostics import critic_map_figure, curves_figure, slices_figure, success_figure
 
 STEPS = np.arange(0, 40, 10)
 
@@ -32,3 +32,13 @@ def test_a_slice_has_a_dot_where_the_actor_is():
     (axes,) = figure.axes
     assert (axes.lines[1].get_xdata(), axes.lines[1].get_ydata()) == pytest.approx((0.025, 0.05))
     assert axes.get_ylim() == (-1.0, 1.0)
+
+
+def test_a_map_of_a_critic_has_its_values_where_they_belong_and_the_actor_on_top():
+    states, actions = np.linspace(0.0, 1.0, 4), np.linspace(-0.1, 0.1, 3)
+    values = states[:, None] + 10.0 * actions
+    figure = critic_map_figure(states, actions, values, np.full(4, 0.1))
+    axes = figure.axes[0]
+    np.testing.assert_allclose(axes.collections[0].get_array(), values.T)
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), np.full(4, 0.1))
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("state", "action")

@@ -1,7 +1,11 @@
 """Films of states, and clear words where none can be made."""
 
+import ctypes.util
+import os
+import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -85,3 +89,35 @@ def test_an_ant_is_filmed(tmp_path: Path) -> None:
     else:
         write_video(model, states, path)
         assert path.stat().st_size > 1000
+
+
+def test_the_camera_follows_a_restored_robot() -> None:
+    pytest.importorskip("mujoco")
+    model: Any = make("Ant-v5", {"render_mode": "rgb_array"})
+    try:
+        check_can_render()
+    except MissingDependency as error:
+        pytest.skip(str(error))
+    start, env = model.initial_state(0), model.env
+    far = start.copy()
+    far[len(env.feature_dims) + 1] += 30.0  # x, behind the feature and the time
+    places = []
+    for state in (start, far):
+        env.set_env_state(state)
+        assert env.render().ndim == 3
+        places.append(env.inner.data.cam_xpos[0].copy())
+    np.testing.assert_allclose(places[1] - places[0], [30.0, 0.0, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("chosen", ["osmesa", "nonsense"])
+def test_a_renderer_that_is_not_there(chosen: str, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    code = "import sys; from pbcs_ompl.cli import main; sys.exit(main(['plan', '--env', 'Ant-v5']))"
+    if chosen == "osmesa" and ctypes.util.find_library("OSMesa"):
+        pytest.skip("OSMesa is installed here")
+    variables = {name: value for name, value in os.environ.items() if name != "PYOPENGL_PLATFORM"}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=variables | {"MUJOCO_GL": chosen},
+                          capture_output=True, text=True)
+    assert done.returncode == 3
+    (line,) = done.stderr.splitlines()
+    assert f"MUJOCO_GL={chosen}: install what it names, set MUJOCO_GL=egl, or unset it" in line

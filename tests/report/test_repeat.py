@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from pbcs_ompl.cli import compare, eval, main, plan, study, train
 from pbcs_ompl.cli.arguments import build_parser, parse
 from pbcs_ompl.compare.sweep import make_sweep
+from pbcs_ompl.core.command_words import environment_words
 from pbcs_ompl.core.run_folder import read_toml, to_toml
 from pbcs_ompl.report.folder import Folder, read_folder
-from pbcs_ompl.report.repeat import environment_words, going_on, repeating
+from pbcs_ompl.report.repeat import going_on, repeating
 from pbcs_ompl.skills.config import TrainConfig
 
 

@@ -185,7 +185,7 @@ def test_the_planner_can_be_chosen_and_the_folder_says_which(tmp_path):
     ({"method": "pbsc"}, UnknownName, "did you mean 'pbcs'"),
     ({"preset": "slow"}, UnknownName, "preset"),
     ({"planner": "Exx"}, UnknownName, "did you mean 'Ex'"),
-    ({"planner_kwargs": {"hld": 10}}, InvalidOption, "did you mean 'hold'"),
+    ({"planner_kwargs": {"hld": 10}}, InvalidOption, "no option 'hld'"),
     ({"method": "plain", "planner": "RRTNH"}, InvalidOption, "without a plan"),
     ({"prest": "fast"}, UnknownName, "did you mean 'preset'"),
     ({"settings": {"bta": 3}}, InvalidOption, "did you mean 'beta'"),
@@ -193,9 +193,10 @@ def test_the_planner_can_be_chosen_and_the_folder_says_which(tmp_path):
     ({"agent_settings": {"discount": 1.0}}, InvalidOption, "discount"),
     ({"max_transitions": 0}, InvalidOption, "max_transitions"),
 ])
-def test_wrong_options_are_named(options, error, hint):
+def test_wrong_options_are_named_before_a_folder_is_made(options, error, hint, tmp_path):
     with pytest.raises(error, match=hint):
-        train("pbcs/Maze-v0", env_kwargs=MAZE, **options)
+        train("pbcs/Maze-v0", env_kwargs=MAZE, out=tmp_path / "run", **options)
+    assert not (tmp_path / "run").exists()
 
 
 def test_folders_are_never_overwritten_and_damage_is_named(tmp_path):

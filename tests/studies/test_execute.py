@@ -136,10 +136,23 @@ def test_a_broken_study_is_one_clear_line(folder, name, text, expected):
         find_study(str(folder))
 
 
-def test_names_must_differ(folder, tmp_path):
-    (folder / "study.py").write_text(SCRIPT.replace('f"coin-{seed}"', '"coin"'))
-    with pytest.raises(PbcsError, match="names of their own"):
+@pytest.mark.parametrize(("settings", "expected"), [
+    ('"name": "coin"', "names of their own"),
+    ('"name": f"a/{seed}"', "names of their own"),
+    ('"coin": seed', "names of their own"),
+    ('"name": f"coin-{seed}", "toss": print', "must be plain values: cannot write builtin_function_or_method"),
+])
+def test_runs_need_names_and_plain_settings(folder, tmp_path, settings, expected):
+    (folder / "study.py").write_text(SCRIPT.replace('"name": f"coin-{seed}"', settings))
+    with pytest.raises(PbcsError, match=expected):
         run_study(find_study(str(folder)), out=tmp_path / "out")
+
+
+def test_a_record_that_is_no_plain_value_costs_its_run_only(folder, tmp_path):
+    strange = 'return {"toss": print if settings["seed"] else 1, "side"'
+    (folder / "study.py").write_text(SCRIPT.replace('return {"side"', strange))
+    result = run_study(find_study(str(folder)), out=tmp_path / "out", seeds=2)
+    assert result.failed == {"coin-1": "TypeError: cannot write builtin_function_or_method as JSON"}
 
 
 def test_the_verb(folder, tmp_path, capsys, monkeypatch):

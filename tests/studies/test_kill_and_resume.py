@@ -15,7 +15,7 @@ from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.studies import find_study, run_study
 from pbcs_ompl.studies.execute import open_study
 
-RUNS, KILLS = 40, 8
+RUNS, KILLS = 120, 8
 SCRIPT = f'''
 import random, time
 from pathlib import Path
@@ -57,24 +57,23 @@ def records_of(out):
 def test_killed_at_random_moments_it_ends_with_the_same_records(folder, tmp_path):
     out, moments = tmp_path / "out", random.Random(1)
     command = [sys.executable, "-m", "pbcs_ompl.cli", "study", str(folder), "--jobs", "2", "--out", str(out)]
-    kept, growth = {}, []
+    kept, interrupted = {}, 0
     for kill in range(KILLS):
         (folder / "log").write_text("")
         process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-        while kill % 2 and len(list(out.glob("runs/*.json"))) <= len(kept):  # half of the kills come amid the runs
-            time.sleep(0.02)
-        time.sleep(moments.uniform(0.0, 1.0 if kill % 2 else 4.0))
+        while kill % 2 and process.poll() is None and len(list(out.glob("runs/*.json"))) <= len(kept):
+            time.sleep(0.02)  # half of the kills come amid the runs, whatever the machine has to do
+        time.sleep(moments.uniform(0.0, 1.0 if kill % 2 else 2.0))
         workers = psutil.Process(process.pid).children() if process.poll() is None else []
-        process.send_signal(signal.SIGKILL)
-        process.wait()
+        process.kill()
+        interrupted += process.wait() == -signal.SIGKILL
         assert psutil.wait_procs(workers, timeout=20)[1] == []
         begun, records = (folder / "log").read_text().split(), records_of(out)
         assert len(begun) == len(set(begun))
         assert not {f"{name}.json" for name in begun} & kept.keys()  # none that was finished is made again
         assert kept == {name: records[name] for name in kept}  # none is lost
-        growth.append(len(records) - len(kept))
         kept = records
-    assert sum(growth) < RUNS
+    assert interrupted >= 5
     assert subprocess.run(command, stdout=subprocess.DEVNULL).returncode == 0
     (folder / "log").unlink()
     undisturbed = run_study(find_study(str(folder)), out=tmp_path / "undisturbed", jobs=2)

@@ -87,6 +87,14 @@ def test_without_runs_of_a_method_nothing_is_said_of_it():
             assert words not in text or claim.agrees is None, text
 
 
+def test_four_runs_without_success_do_not_show_that_there_is_none():
+    records = [record(label, 2, index, False) for label in ("PBCS", "PB", "DDPG", "TD3") for index in range(4)]
+    claims = verdicts(records)
+    assert {text for text, claim in claims.items() if claim.agrees is not None} == {
+        text for text in claims if "95% of the mazes" in text}
+    assert find(verdicts([*records, record("TD3", 2, 4, True)]), "TD3 alone solves some").agrees is True
+
+
 def test_pbcs_runs_first_and_then_the_others_in_balance():
     settings = STUDY.runs(STUDY.sweep, 20)
     labels = [one["label"] for one in settings]

@@ -20,12 +20,13 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
-    """Search, and count the nodes in each bin."""
+    """Search; for one seed, count the nodes in each bin."""
     model = make(ENV, settings["env_kwargs"])
     found = plan(model, settings["planner"], seed=settings["seed"], max_transitions=settings["max_transitions"])
-    counts = bin_counts(model, found.tree.states)
-    pictured = {"counts": counts.tolist()} if settings["seed"] == PICTURED_SEED else {}
-    return {**settings, **found.summary(), "visited_bins": int((counts > 0).sum()), **pictured}
+    record = {**settings, **found.summary()}
+    if settings["seed"] == PICTURED_SEED:
+        record["counts"] = bin_counts(model, found.tree.states).tolist()
+    return record
 
 
 def bin_counts(model: ResetAnywhere, states: Array) -> Array:

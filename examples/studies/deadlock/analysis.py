@@ -18,6 +18,8 @@ GREEDY, OU = "ddpg-epsilon-greedy", "ddpg-ornstein-uhlenbeck"
 CURES = {"ddpg-argmax-epsilon-greedy": ("DDPG-argmax", "Fig. 6.10(a)"), "sac-epsilon-greedy": ("SAC", "Fig. 6.10(b)"),
          "ddpg-regression-epsilon-greedy": ("DDPG with the actor's update by regression", "6.6.3, Eq. 6.5")}
 TD3 = "td3-epsilon-greedy"
+OBSERVED = {"saturation": "saturated actions", "flat_share": "flat share", "deadlock_index": "deadlock index",
+            "distance_to_returns": "mean |Q - Q^π|"}
 SLICED_STATES = (0.0, 0.05, 0.1, 0.3)
 BINS = (0, 50, 100, 200, 400, 800, 1600)
 """Steps of the first reward that are told apart, as powers of two of the longest episode."""
@@ -127,14 +129,14 @@ def _rewards_are_there(variants: dict[str, Variant]) -> list[Claim]:
 
 
 def _stuck(variants: dict[str, Variant]) -> list[Claim]:
-    failed = _failed_with_reward(variants).values()
+    failed = [part for name, part in _failed_with_reward(variants).items() if name.startswith((GREEDY, OU))]
     parts = {name: np.concatenate([np.empty(0), *(chosen.observed(name)[rows] for chosen, rows in failed)])
              for name in ("saturation", "deadlock_index", "distance_to_returns")}
     saturated, stuck, come = (parts["saturation"] > 0.9, parts["deadlock_index"] > 0.0,
                               parts["distance_to_returns"] < 0.1)
     told = len(saturated) > 0
     note = "" if told else "no seed failed after it had met the reward"
-    return [Claim("failed seeds that have met the reward have a saturated actor (over 90 % of the actions)",
+    return [Claim("DDPG's failed seeds that have met the reward have a saturated actor (over 90 % of the actions)",
                   bool(saturated.all()) if told else None, {"saturated": rate(saturated.sum(), len(saturated))},
                   "[Matheron2020] 6.2.2", note),
             Claim("and a critic that knows better actions but shows no way to them (deadlock index > 0)",
@@ -210,6 +212,10 @@ def _draw(variants: dict[str, Variant], drift: dict[str, Any] | None, figures: P
         save(curves_figure(np.array(drift["updates"]), panels, title="Drift: no reward at all (Fig. 6.4)"),
              figures / "drift.png")
     for name, (chosen, failed) in _failed_with_reward(variants).items():
+        observed = [record["observed"] for record in chosen.records]
+        panels = {title: joined_rows(observed, key, len(chosen.steps))[:, failed] for key, title in OBSERVED.items()}
+        title = f"{name}: failed seeds that have met the reward"
+        save(curves_figure(chosen.steps, panels, xlabel="steps", title=title), figures / f"diagnostics-{name}.png")
         seeds = np.concatenate([record["seeds"] for record in chosen.records])[failed]
         one = next((part for record in chosen.records for part in record["critics"] if part["seed"] in seeds), None)
         if one is not None:
@@ -251,12 +257,12 @@ def _draw_first_rewards(variants: dict[str, Variant], figures: Path) -> None:
 
 def _draw_rewarded(variants: dict[str, Variant], figures: Path) -> None:
     """Draw the rewards that failed seeds meet in the mini-batches after an episode."""
-    failed = {name: (chosen, rows) for name, (chosen, rows) in _failed_with_reward(variants).items() if name == GREEDY}
-    for chosen, rows in failed.values():
-        shares = joined_rows(chosen.records, "rewarded", len(chosen.steps))
-        panel = {"failed seeds": MINI_BATCHES * shares[:, rows]}
-        save(curves_figure(chosen.steps, panel, xlabel="steps", title="Rewarded transitions in 50 mini-batches of 100, "
-                           "expected (Fig. 6.3a)"), figures / "rewarded.png")
+    title = f"Rewards among {MINI_BATCHES:,} draws, expected (Fig. 6.3a)"
+    failed = {name: part for name, part in _failed_with_reward(variants).items() if name.endswith("epsilon-greedy")}
+    panels = {f"failed, {name}": MINI_BATCHES * joined_rows(chosen.records, "rewarded", len(chosen.steps))[:, rows]
+              for name, (chosen, rows) in failed.items()}
+    for chosen, _ in list(failed.values())[:1]:
+        save(curves_figure(chosen.steps, panels, xlabel="steps", title=title), figures / "rewarded.png")
 
 
 def _draw_critic(name: str, one: dict[str, Any], figures: Path) -> None:

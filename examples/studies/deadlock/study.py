@@ -53,8 +53,10 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
 
 def _agent(settings: dict[str, Any], model: ResetAnywhere, seeds: list[int]) -> StackedAgent:
     kind = load("agent", settings["agent"])
+    # A GPU's update would be compiled anew each time that the stack shrinks.
     return kind(model.observation_size, model.action_low, model.action_high, seeds=seeds, device=settings["device"],
-                settings=kind.settings_type(**settings["agent_settings"]))
+                settings=kind.settings_type(**settings["agent_settings"]),
+                compile="auto" if settings["device"] == "cpu" else False)
 
 
 def _critics(agent: StackedAgent, failed: Array) -> list[dict[str, Any]]:

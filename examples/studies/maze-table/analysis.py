@@ -13,12 +13,12 @@ from pbcs_ompl.figures.chain import chain_figure
 from pbcs_ompl.figures.maze import furnish, plane
 from pbcs_ompl.reset_anywhere import make
 from pbcs_ompl.studies import Claim, rate
+from pbcs_ompl.studies.paired import FEWEST, SURE
 
 Records = list[dict[str, Any]]
 ALONE = ("DDPG", "TD3")
 BARS = (((2, 3, 4, 5, 7), 0.95, "[Matheron2020] 7.4: PBCS solves mazes up to 7x7; the bar is ours"),
         ((10, 15), 0.8, "ours: beyond [Matheron2020]"))
-SURE = 0.05
 MILLION = 1_000_000
 """[Matheron2020] 5.6: a run succeeds within so many transitions, planning included."""
 COLOURS = {True: "#e3f4e3", False: "#fbe3e3"}
@@ -45,6 +45,12 @@ def _of(records: Records, label: str, *sizes: int) -> Records:
 
 def _solved(records: Records, key: str = "solved") -> dict[str, Any]:
     return rate(sum(record[key] for record in records), len(records))
+
+
+def _any_solved(records: Records) -> bool | None:
+    """Return whether any of them is solved; None when there are too few to say that there is none."""
+    solved = any(record["solved"] for record in records)
+    return solved if solved or len(records) >= FEWEST else None
 
 
 def _by_size(records: Records, label: str) -> dict[str, Any]:
@@ -77,16 +83,17 @@ def _alone(records: Records) -> list[Claim]:
         small = _of(records, label, 2)
         claims += [_fails_from_3x3(records, label, f"{label} alone"),
                    Claim(f"{label} alone solves some 2x2 mazes within a million transitions",
-                         any(record["solved"] for record in small) if small else None, _counts(small),
+                         _any_solved(small), _counts(small),
                          "[Matheron2020] 7.4: all but the simplest mazes are too hard")]
     return claims
 
 
 def _fails_from_3x3(records: Records, label: str, name: str) -> Claim:
     large = [record for record in _of(records, label) if record["size"] > 2]
+    solved = _any_solved(large)
     return Claim(f"{name} solves no maze from 3x3 on within a million transitions",
-                 not any(record["solved"] for record in large) if large else None,
-                 {**_counts(large), **_by_size(large, label)}, "[Matheron2020] 7.4")
+                 None if solved is None else not solved, {**_counts(large), **_by_size(large, label)},
+                 "[Matheron2020] 7.4")
 
 
 def _counts(records: Records) -> dict[str, Any]:
@@ -98,9 +105,9 @@ def _backplay(records: Records) -> list[Claim]:
     backplay, alone = _solved(small), _solved(_of(records, "DDPG", 2))
     return [_fails_from_3x3(records, "PB", "PB"),
             Claim("PB regularly fails in 2x2 mazes (in at least one run of ten)",
-                  backplay["rate"] <= 0.9 if small else None, _counts(small), "[Matheron2020] 5.6"),
+                  backplay["rate"] <= 0.9 if len(small) >= FEWEST else None, _counts(small), "[Matheron2020] 5.6"),
             Claim("PB solves 2x2 mazes much more often than DDPG alone (the intervals lie apart)",
-                  backplay["wilson"][0] > alone["wilson"][1] if backplay["n"] and alone["n"] else None,
+                  backplay["wilson"][0] > alone["wilson"][1] if min(backplay["n"], alone["n"]) >= FEWEST else None,
                   {"PB": backplay, "DDPG": alone}, "[Matheron2020] 5.6, Fig. 5.3")]
 
 
@@ -114,7 +121,7 @@ def _compared(records: Records) -> list[Claim]:
         ours, theirs = (sum(one > other for one, other in pairs), sum(one < other for one, other in pairs))
         chance = binomtest(ours, ours + theirs, alternative="greater").pvalue if ours + theirs else 1.0
         claims.append(Claim(f"within the same million transitions PBCS solves more mazes than {label} (p < {SURE})",
-                            bool(chance < SURE) if pairs else None,
+                            bool(chance < SURE) if len(pairs) >= FEWEST else None,
                             {"PBCS": rate(sum(one for one, _ in pairs), len(pairs)),
                              label: rate(sum(other for _, other in pairs), len(pairs)),
                              f"only PBCS, only {label}": [ours, theirs], "p (McNemar, exact)": float(chance)},
@@ -158,8 +165,8 @@ def _draw_table(records: Records, figures: Path) -> None:
     for record in pictured:
         place = labels.index(record["label"]) * len(sizes) + sizes.index(record["size"]) + 1
         _draw_one(record, figure.add_subplot(len(labels), len(sizes), place))
-    figure.suptitle("Red: plan; green: the policy without noise; purple: activation sets. Background: solved or not",
-                    fontsize=11)
+    figure.suptitle("Numbers: transitions; green background: solved; red: plan; green: the policy without noise; "
+                    "purple: activation sets", fontsize=11)
     save(figure, figures / "mazes.png")
 
 

@@ -9,10 +9,11 @@ KEPT = ("solved", "success_rate", "nominal_success_rate", "steps_median", "skill
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
-    """One run for each task and seed, seed by seed, so that a part is balanced."""
-    return [{"name": f"{task}-{sweep['first_seed'] + index}", "task": task, "seed": sweep["first_seed"] + index,
-             "preset": sweep["preset"], "env_kwargs": {}, "planner_kwargs": {}, "settings": {}, **options}
-            for index in range(seeds) for task, options in sweep["tasks"].items() if index < options["seeds"]]
+    """One run for each task and seed: seed by seed, so that a part is balanced, tasks with few seeds last."""
+    chosen = [{"name": f"{task}-{sweep['first_seed'] + index}", "task": task, "seed": sweep["first_seed"] + index,
+               "preset": sweep["preset"], "env_kwargs": {}, "planner_kwargs": {}, "settings": {}, **options}
+              for index in range(seeds) for task, options in sweep["tasks"].items() if index < options["seeds"]]
+    return sorted(chosen, key=lambda settings: -settings["seeds"])
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:

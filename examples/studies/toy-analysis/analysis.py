@@ -11,6 +11,8 @@ from pbcs_ompl.studies import Claim, rate
 DEVIATIONS = 4.0
 """A simulation agrees when it is nowhere further off than so many standard deviations."""
 TITLES = {"walk": "random walk with sink", "p-greedy": "p-greedy random walk with sink, p = 0.1"}
+DENSITIES = {"walk": "Figs. A.1, A.4", "p-greedy": "as Figs. A.1, A.4"}
+SUCCESSES = {"walk": "Fig. A.2", "p-greedy": "Fig. A.3"}
 
 
 def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
@@ -41,7 +43,7 @@ def _success_agrees(record: dict[str, Any]) -> Claim:
     return Claim(f"{TITLES[record['kind']]}: the success rate is as computed, within {DEVIATIONS:g} deviations",
                  off < DEVIATIONS, {"N": record["walks"], "largest deviation": off, "after 50 steps, exact": exact[-1],
                                     "simulated": rate(round(found[-1] * record["walks"]), record["walks"])},
-                 "[Matheron2020] Figs. A.2, A.3")
+                 f"[Matheron2020] {SUCCESSES[record['kind']]}")
 
 
 def _density_agrees(record: dict[str, Any]) -> Claim:
@@ -49,7 +51,7 @@ def _density_agrees(record: dict[str, Any]) -> Claim:
     some = masses * counts.sum() >= 10.0
     off = _off(counts[some] / counts.sum(), masses[some], int(counts.sum()))
     return Claim(f"{TITLES[record['kind']]}: so is the density after {record['density_after']} steps", off < DEVIATIONS,
-                 {"N": int(counts.sum()), "largest deviation": off}, "[Matheron2020] Fig. A.4")
+                 {"N": int(counts.sum()), "largest deviation": off}, f"[Matheron2020] {DENSITIES[record['kind']]}")
 
 
 def _theorem_5(record: dict[str, Any]) -> Claim:
@@ -91,7 +93,7 @@ def _draw_densities(record: dict[str, Any], figures: Path) -> None:
               label=f"{record['density_after']} steps, simulated (N = {counts.sum():,})")
     axes.set_xlabel("state")
     axes.set_ylabel("density, reward not found before")
-    axes.set_title(f"{TITLES[record['kind']]} (Figs. A.1, A.4)", fontsize=10)
+    axes.set_title(f"{TITLES[record['kind']]} ({DENSITIES[record['kind']]})", fontsize=10)
     axes.legend(frameon=False, fontsize=9)
     save(figure, figures / f"densities-{record['kind']}.png")
 
@@ -103,7 +105,8 @@ def _draw_success(record: dict[str, Any], figures: Path) -> None:
     axes.plot(steps, record["found"], ".", color="black", label=f"simulated (N = {record['walks']:,})")
     if record["kind"] == "p-greedy":
         axes.plot(steps, record["theorem_5"], "--", linewidth=1.5, label="Theorem 5 as printed")
-    _finish(axes, figures / f"success-{record['kind']}.png", figure, f"{TITLES[record['kind']]} (Figs. A.2, A.3)")
+    title = f"{TITLES[record['kind']]} ({SUCCESSES[record['kind']]})"
+    _finish(axes, figures / f"success-{record['kind']}.png", figure, title)
 
 
 def _finish(axes: Any, path: Path, figure: Any, title: str) -> None:
