@@ -97,11 +97,11 @@ class OrnsteinUhlenbeck:
         if not (sigma >= 0.0 and 0.0 <= theta * dt <= 1.0 and dt > 0.0):
             raise InvalidOption(f"sigma={sigma}, theta={theta}, dt={dt}: expected sigma >= 0 and theta dt in [0, 1]")
         self.sigma, self.theta, self.dt = sigma, theta, dt
-        self._x: Array = np.zeros((1, 1, 1))
+        self._x: Array | None = None
 
     def keep(self, indices: Sequence[int]) -> None:
         """Keep the x of these seeds."""
-        self._x = self._x[list(indices)]
+        self._x = None if self._x is None else self._x[list(indices)]
 
     def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
         """Draw normal numbers."""
@@ -109,7 +109,7 @@ class OrnsteinUhlenbeck:
 
     def apply(self, actions: Array, draws: Array, fresh: BoolArray, low: Array, high: Array) -> Array:
         """Move x by one step and add it; the sum is cut off at the box."""
-        before = np.where(fresh[..., None], 0.0, self._x)
+        before = 0.0 if self._x is None else np.where(fresh[..., None], 0.0, self._x)
         self._x = before * (1.0 - self.theta * self.dt) + self.sigma * np.sqrt(self.dt) * draws
         return np.clip(actions + self._x * (high - low) / 2.0, low, high)
 

@@ -20,6 +20,7 @@ examples:
   pbcs plan --env pbcs/Maze-v0 --env-kwargs '{"size": 9, "maze_seed": 1}' --planner Ex
   pbcs train --env pbcs/Maze-v0 --env-kwargs '{"size": 5, "maze_seed": 1}' --seed 0
   pbcs compare --planners Ex RRTNH EST KPIECE1 --env pbcs/Maze-v0 --env-kwargs '{"size": 9}' --seeds 10
+  pbcs report runs
 
 exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed
 """
@@ -200,7 +201,8 @@ def _study(verb: Parser) -> None:
 def _report(verb: Parser) -> None:
     """show a result folder, or all of those below one, as one HTML page"""
     verb.add_argument("dir", metavar="DIR", help="a folder of results, or one that holds many, such as runs")
-    verb.add_argument("--out", metavar="FILE", help="the page (report.html in DIR); one that is there is replaced")
+    verb.add_argument("--out", metavar="FILE",
+                      help="the page (report.html in DIR); an older report is replaced, another file never")
 
 
 def _add_execution(verb: Parser) -> None:

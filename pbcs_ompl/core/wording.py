@@ -27,8 +27,10 @@ def percent(rate: float, wilson: Sequence[float]) -> str:
 
 def in_words(value: Any) -> str:
     """Write what decides a claim: a rate with its Wilson interval, other numbers, lists and tables of them."""
-    if isinstance(value, dict) and value.get("rate") is not None:
-        return f"{value['successes']}/{value['n']} = {percent(value['rate'], value['wilson'])}"
+    if isinstance(value, dict) and "wilson" in value:
+        rate, (low, high) = value["rate"], value["wilson"]
+        interval = "" if rate is None else f" = {rate:.1%} (95 % interval {low:.1%} to {high:.1%})"
+        return f"{value['successes']}/{value['n']}{interval}"
     if isinstance(value, dict):
         return ", ".join(f"{name} {in_words(part)}" for name, part in value.items())
     if isinstance(value, list | tuple):

@@ -78,4 +78,4 @@ def _finish(figure: Figure, axes: Axes, title: str, xlabel: str, ylabel: str) ->
     axes.set_ylabel(ylabel)
     axes.grid(alpha=0.3, axis="y")
     if axes.get_legend_handles_labels()[0]:
-        figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+        figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)

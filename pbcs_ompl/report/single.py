@@ -1,5 +1,6 @@
 """What a report says of one plan, one training, one evaluation."""
 
+from textwrap import shorten
 from typing import Any
 
 from pbcs_ompl.core.wording import duration, percent, short
@@ -53,6 +54,6 @@ def evaluation_content(folder: Folder) -> Content:
 
 
 def environment_name(config: dict[str, Any]) -> str:
-    """Return the id of an environment with its options, for a title."""
+    """Return the id of an environment with its options, for a title: the settings have them in full."""
     options = ", ".join(f"{name}={value}" for name, value in config.get("env_kwargs", {}).items())
-    return f"{config['env']}({options})" if options else str(config["env"])
+    return f"{config['env']}({shorten(options, 80, placeholder=' ...')})" if options else str(config["env"])

@@ -93,3 +93,22 @@ def test_wrong_names_and_values_are_named() -> None:
         make_noise("gaussian", sigma=float("nan"))
     with pytest.raises(InvalidOption, match="theta"):
         make_noise("ornstein-uhlenbeck", theta=-1.0)
+
+
+@pytest.mark.parametrize("name", NOISES)
+def test_seeds_that_are_kept_explore_as_they_would_have_in_the_whole_stack(name: str) -> None:
+    steps, kept = 8, [2, 0]
+    whole, part = make_noise(name), make_noise(name)
+    part.keep(range(3))  # before the first step there is nothing to forget
+    draws = draw_all(whole, generators(1, 2, 3), (steps, 4), 2)
+    middle = np.broadcast_to(CENTRE, (3, 4, 2))
+    for t in range(steps):
+        fresh = np.full((3, 4), t in (0, 6))
+        expected = whole.apply(middle, draws[:, t], fresh, LOW, HIGH)
+        if t < 4:
+            part.apply(middle, draws[:, t], fresh, LOW, HIGH)
+        else:
+            if t == 4:
+                part.keep(kept)
+            np.testing.assert_array_equal(part.apply(middle[kept], draws[kept, t], fresh[kept], LOW, HIGH),
+                                          expected[kept])

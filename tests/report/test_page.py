@@ -9,9 +9,10 @@ import pytest
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.core.run_folder import write_json, write_text
-from pbcs_ompl.core.wording import seeds_in_words
+from pbcs_ompl.core.wording import in_words, seeds_in_words
 from pbcs_ompl.report import write_report
 from pbcs_ompl.report.content import MOST_RUNS
+from pbcs_ompl.studies import rate
 
 REFERENCES = {"src", "href", "srcset", "data", "action", "poster", "background"}
 
@@ -51,7 +52,7 @@ def test_the_verb_reports_every_folder(copy, capsys):
     assert outcomes["study"][1] == "1 of 3 claims true, 1 false, 1 undecided"
     assert outcomes["given"][1] == "not solved"
     page = Page(copy / "runs/report.html")
-    for said in ("1 < 0 & <b>bold</b>", "1/3 = 33% (95 % interval 6% to 79%)",
+    for said in ("1 < 0 & <b>bold</b>", "1/3 = 33.3% (95 % interval 6.1% to 79.2%)",
                  "ZeroDivisionError: division by zero", "cannot build SST", "the budget of 1200 transitions is used up",
                  '"hold" = 2', "Study coin-toss", "numpy", "torch", "logical cores"):
         assert said in page.text, said
@@ -165,3 +166,11 @@ def test_damage_of_one_folder_is_an_error(copy):
     ([], ""), ([3], "3"), ([2, 0, 1, 1], "0-2"), ([5, 0, 1, 9, 10], "0-1, 5, 9-10")])
 def test_seeds_in_words(seeds, text):
     assert seeds_in_words(seeds) == text
+
+
+@pytest.mark.parametrize(("value", "text"), [
+    (rate(0, 0), "0/0"), (rate(16, 300), "16/300 = 5.3% (95 % interval 3.3% to 8.5%)"),
+    ({"2x2": rate(1, 1), "skills": [2, 0.25]}, "2x2 1/1 = 100.0% (95 % interval 20.7% to 100.0%), skills [2, 0.25]"),
+])
+def test_numbers_in_words(value, text):
+    assert in_words(value) == text
