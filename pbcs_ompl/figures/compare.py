@@ -20,7 +20,7 @@ def distribution_figure(environments: Mapping[str, Runs], *, title: str = "") ->
     """Draw the share of runs solved within a number of transitions, as [Matheron2020] Fig. 3.9.
 
     One panel for each environment, in it one step curve for each planner. A run that did not reach the goal never
-    counts, so that a curve ends at the planner's solved share.
+    counts, so that a curve ends at the planner's solved share; all curves go as far as the longest run.
     """
     return _panels(environments, _draw_distributions, "transitions to the goal", "share of the runs", title)
 
@@ -54,8 +54,8 @@ def _panels(environments: Mapping[str, Runs], draw: Callable[[Axes, Runs], None]
 def _draw_distributions(axes: Axes, runs: Runs) -> None:
     solved = {name: np.sort([float(run["transitions"]) for run in some if run["solved"]])
               for name, some in runs.items()}
-    everything = np.concatenate([np.empty(0), *solved.values()])
-    least, most = (everything.min(), everything.max()) if len(everything) else (1.0, 10.0)
+    spent = [float(run["transitions"]) for some in runs.values() for run in some if run["transitions"]]
+    least, most = (min(spent), max(spent)) if spent else (1.0, 10.0)
     for name, found in solved.items():
         total = len(runs[name])
         x = np.concatenate([found[:1], found, [most]]) if len(found) else np.array([least, most])
