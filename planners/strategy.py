@@ -12,6 +12,9 @@ from pbcs_ompl.core.errors import InvalidOption
 from planners.options import check_names, keywords
 from planners.tree import Tree
 
+SHELL_OPTIONS = ("batch", "hold")
+"""The options that every planner has beside those of its strategy."""
+
 
 @dataclass(frozen=True, eq=False)
 class Space:
@@ -91,7 +94,7 @@ class Strategy(ABC):
             InvalidOption: `__init__` knows no such option, or refuses its value.
         """
         known = [] if cls.__init__ is object.__init__ else keywords(cls)
-        check_names(planner, options, known)
+        check_names(planner, options, [*known, *SHELL_OPTIONS])
         try:
             return cls(**options)
         except (TypeError, ValueError) as error:

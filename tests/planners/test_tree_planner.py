@@ -200,8 +200,10 @@ def test_unknown_options_suggest_the_closest(make_setup, square):
         Ex(si, bin_sise=0.1)
     with pytest.raises(InvalidOption, match=r"'Uniform' has no option 'with'.*'width'"):
         Uniform.build(si, seed=1, **{"with": 3})
-    with pytest.raises(InvalidOption, match="it takes none"):
+    with pytest.raises(InvalidOption, match=r"'goal_bias'; choose from batch, hold"):
         RRTNH.build(si, seed=1, goal_bias=0.1)
+    with pytest.raises(InvalidOption, match=r"'hld'; did you mean 'hold'"):
+        Ex.build(si, seed=1, hld=3)
 
 
 def test_a_model_of_another_size_is_refused(make_setup, square):
