@@ -6,13 +6,13 @@ Importing is light: the entry points are strings, so that numba, FCL and MuJoCo 
 import gymnasium
 
 ENTRY_POINTS = {
-    "pbcs/Maze-v0": "envs.maze.maze:MazeEnv",
-    "pbcs/Box-v0": "envs.box_disc:BoxEnv",
-    "pbcs/Disc-v0": "envs.box_disc:DiscEnv",
-    "pbcs/Toy1D-v0": "envs.toy_1d:Toy1DEnv",
-    "pbcs/Drift-v0": "envs.drift:DriftEnv",
-    "pbcs/AntMaze-v0": "envs.ant_maze:AntMazeEnv",
-    "pbcs/SparseHalfCheetah-v0": "envs.sparse_half_cheetah:SparseHalfCheetahEnv",
+    "pbcs/Maze-v0": "pbcs_ompl.envs.maze.maze:MazeEnv",
+    "pbcs/Box-v0": "pbcs_ompl.envs.box_disc:BoxEnv",
+    "pbcs/Disc-v0": "pbcs_ompl.envs.box_disc:DiscEnv",
+    "pbcs/Toy1D-v0": "pbcs_ompl.envs.toy_1d:Toy1DEnv",
+    "pbcs/Drift-v0": "pbcs_ompl.envs.drift:DriftEnv",
+    "pbcs/AntMaze-v0": "pbcs_ompl.envs.ant_maze:AntMazeEnv",
+    "pbcs/SparseHalfCheetah-v0": "pbcs_ompl.envs.sparse_half_cheetah:SparseHalfCheetahEnv",
 }
 
 EPISODE_STEPS = {"pbcs/Toy1D-v0": 50, "pbcs/Drift-v0": 50}
@@ -20,3 +20,8 @@ EPISODE_STEPS = {"pbcs/Toy1D-v0": 50, "pbcs/Drift-v0": 50}
 for _env_id, _entry_point in ENTRY_POINTS.items():
     if _env_id not in gymnasium.registry:
         gymnasium.register(_env_id, entry_point=_entry_point, max_episode_steps=EPISODE_STEPS.get(_env_id, 1000))
+
+if __name__ == "envs":  # the folder of a checkout, imported by its own name
+    from pbcs_ompl.core.alias import alias_package
+
+    alias_package("envs", "pbcs_ompl.envs")

@@ -6,11 +6,11 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from envs.maze.layout import MazeLayout
-from envs.mujoco_env import FAR, FAST, BatchedMujocoEnv, mujoco
-from envs.walls_fcl import WallsFcl
 from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.envs.maze.layout import MazeLayout
+from pbcs_ompl.envs.mujoco_env import FAR, FAST, BatchedMujocoEnv, mujoco
+from pbcs_ompl.envs.walls_fcl import WallsFcl
 
 ANT = Path(gymnasium.__file__).parent / "envs/mujoco/assets/ant.xml"
 FRAME_SKIP = 5
@@ -25,7 +25,7 @@ TORSO = slice(1, 3)
 
 
 class AntMazeEnv(BatchedMujocoEnv):
-    """Gymnasium's ant in a maze of `envs.maze`: reward 1 where the torso is within 0.2 cells of the goal.
+    """Gymnasium's ant in a maze of `pbcs_ompl.envs.maze`: reward 1 where the torso is within 0.2 cells of the goal.
 
     The state is [time | qpos 15 | qvel 14], the observation [qpos | qvel], the feature (x, y) in metres. Differs from
     [OpenAI2018]'s AntMaze, of which the thesis gives no numbers: the walls are 0.1 cells thick as in the thesis's own

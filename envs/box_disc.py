@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from envs import box_disc_kernels as kernels
-from envs.point_env import CompiledStep, PointEnv
-from envs.rendering import rasterise
 from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.envs import box_disc_kernels as kernels
+from pbcs_ompl.envs.point_env import CompiledStep, PointEnv
+from pbcs_ompl.envs.rendering import rasterise
 
 EXTENT = 5.0
 

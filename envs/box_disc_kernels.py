@@ -3,8 +3,8 @@
 import numpy as np
 from numba import njit
 
-from envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
 from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
+from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
 
 Point = tuple[float, float]
 Step = tuple[float, float, bool]

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from envs.line_env import LineEnv
 from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.envs.line_env import LineEnv
 
 
 class DriftEnv(LineEnv):

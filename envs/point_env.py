@@ -8,10 +8,10 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from envs import point_kernels
-from envs.rendering import rasterise
 from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray, Transition
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
+from pbcs_ompl.envs import point_kernels
+from pbcs_ompl.envs.rendering import rasterise
 
 MAX_STEP = 0.1
 GOAL_RADIUS = 0.2

@@ -1,6 +1,6 @@
 """1D-Toy, the smallest environment in which DDPG can get stuck: `pbcs/Toy1D-v0`."""
 
-from envs.line_env import MAX_STEP, LineEnv
+from pbcs_ompl.envs.line_env import MAX_STEP, LineEnv
 
 
 class Toy1DEnv(LineEnv):

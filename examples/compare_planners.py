@@ -5,7 +5,7 @@
 
 import sys
 
-from pbcs_ompl.compare import compare
+from pbcs_ompl.experiments.compare import compare
 
 
 def main(seeds: str = "5") -> None:

@@ -18,7 +18,7 @@ from ompl import base as ob
 from ompl import control as oc
 
 import pbcs_ompl
-from planners import Strategy
+from pbcs_ompl.planners import Strategy
 
 
 class Emptiest(Strategy):

@@ -9,7 +9,7 @@ from ompl import base as ob
 from ompl import control as oc
 from ompl import util as ou
 
-from planners import Ex
+from pbcs_ompl.planners import Ex
 
 WALL_X, GAP_Y = 0.0, 0.5  # a wall at x = 0 that leaves a gap above y = 0.5
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pbcs_ompl.bridge.plan import PlanResult, plan
     from pbcs_ompl.bridge.trajectory import Trajectory
-    from pbcs_ompl.reset_anywhere import adapt, check_resettable, make
+    from pbcs_ompl.resettable import adapt, check_resettable, make
     from pbcs_ompl.skills import train
     from pbcs_ompl.skills.chain import SkillChain
     from pbcs_ompl.skills.evaluation import evaluate
@@ -25,8 +25,8 @@ __all__ = ["PlanResult", "SkillChain", "Trajectory", "adapt", "check_resettable"
 _HOMES = {
     "plan": "pbcs_ompl.bridge.plan", "PlanResult": "pbcs_ompl.bridge.plan",
     "Trajectory": "pbcs_ompl.bridge.trajectory",
-    "make": "pbcs_ompl.reset_anywhere", "adapt": "pbcs_ompl.reset_anywhere",
-    "check_resettable": "pbcs_ompl.reset_anywhere",
+    "make": "pbcs_ompl.resettable", "adapt": "pbcs_ompl.resettable",
+    "check_resettable": "pbcs_ompl.resettable",
     "train": "pbcs_ompl.skills", "SkillChain": "pbcs_ompl.skills.chain",
     "evaluate": "pbcs_ompl.skills.evaluation",
 }

@@ -7,14 +7,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from planners.est_adapted import ESTAdapted
-    from planners.ex import Ex
-    from planners.random_walk import RandomWalk
-    from planners.rrt_nh import RRTNH
-    from planners.rrt_steered import RRTSteered
-    from planners.strategy import Space, Strategy
-    from planners.tree import Tree
-    from planners.tree_planner import TreePlanner
+    from pbcs_ompl.planners.est_adapted import ESTAdapted
+    from pbcs_ompl.planners.ex import Ex
+    from pbcs_ompl.planners.random_walk import RandomWalk
+    from pbcs_ompl.planners.rrt_nh import RRTNH
+    from pbcs_ompl.planners.rrt_steered import RRTSteered
+    from pbcs_ompl.planners.strategy import Space, Strategy
+    from pbcs_ompl.planners.tree import Tree
+    from pbcs_ompl.planners.tree_planner import TreePlanner
 
 __all__ = ["RRTNH", "ESTAdapted", "Ex", "RRTSteered", "RandomWalk", "Space", "Strategy", "Tree",
            "TreePlanner"]
@@ -28,3 +28,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+if __name__ == "planners":  # the folder of a checkout, imported by its own name
+    from pbcs_ompl.core.alias import alias_package
+
+    alias_package("planners", "pbcs_ompl.planners")

@@ -13,7 +13,7 @@ from numba.core.dispatcher import Dispatcher
 
 from pbcs_ompl.core.contracts import Array, IndexArray
 from pbcs_ompl.core.errors import CallbackFailed
-from planners.tree import Tree
+from pbcs_ompl.planners.tree import Tree
 
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]

@@ -4,8 +4,8 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 from pbcs_ompl.core.contracts import Array, Counter, IndexArray
-from planners.strategy import Space
-from planners.tree import Tree
+from pbcs_ompl.planners.strategy import Space
+from pbcs_ompl.planners.tree import Tree
 
 
 class Door(ABC):

@@ -3,12 +3,12 @@
 import numpy as np
 
 from pbcs_ompl.core.contracts import IndexArray
-from planners.kernels.bin_queue import empty_queue, insert
-from planners.kernels.sparse import draw_sparse
-from planners.options import positive
-from planners.strategy import Space, Strategy
-from planners.tree import Tree
-from planners.tree_planner import StrategyPlanner
+from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert
+from pbcs_ompl.planners.kernels.sparse import draw_sparse
+from pbcs_ompl.planners.options import positive
+from pbcs_ompl.planners.strategy import Space, Strategy
+from pbcs_ompl.planners.tree import Tree
+from pbcs_ompl.planners.tree_planner import StrategyPlanner
 
 NODES_PER_BATCH = 100
 WIDEST = 4

@@ -6,12 +6,12 @@ import numpy as np
 
 from pbcs_ompl.core.contracts import Array, IndexArray
 from pbcs_ompl.core.errors import InvalidOption
-from planners.compiled import CompiledStep
-from planners.kernels import ex_loop
-from planners.kernels.bin_queue import empty_queue, insert, select, tied_bins
-from planners.strategy import Space, Strategy
-from planners.tree import Tree
-from planners.tree_planner import StrategyPlanner
+from pbcs_ompl.planners.compiled import CompiledStep
+from pbcs_ompl.planners.kernels import ex_loop
+from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert, select, tied_bins
+from pbcs_ompl.planners.strategy import Space, Strategy
+from pbcs_ompl.planners.tree import Tree
+from pbcs_ompl.planners.tree_planner import StrategyPlanner
 
 
 class LeastExpanded(Strategy):
@@ -65,7 +65,7 @@ class LeastExpanded(Strategy):
         self.queue = insert(self.queue, tree.features[new], tree.terminal[new], self._size, first)
 
     def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:
-        """Expand up to `count` nodes one at a time in compiled code (see `planners.compiled`)."""
+        """Expand up to `count` nodes one at a time in compiled code (see `pbcs_ompl.planners.compiled`)."""
         bounds = np.array([self.space.action_low, self.space.action_high])
         uniforms = self.rng.random((count, 2 + bounds.shape[1]))
         tree.reserve(count)

@@ -7,11 +7,11 @@ from ompl import control as oc
 
 from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere, Transition
 from pbcs_ompl.core.errors import CallbackFailed, Mismatch
-from planners.compiled import CompiledStep, step_of
-from planners.door import Door
-from planners.real_values import leaves, read, writer
-from planners.strategy import Space
-from planners.tree import Tree
+from pbcs_ompl.planners.compiled import CompiledStep, step_of
+from pbcs_ompl.planners.door import Door
+from pbcs_ompl.planners.real_values import leaves, read, writer
+from pbcs_ompl.planners.strategy import Space
+from pbcs_ompl.planners.tree import Tree
 
 
 class ModelDoor(Door):

@@ -7,10 +7,10 @@ from ompl import control as oc
 
 from pbcs_ompl.core.contracts import Array, Counter, IndexArray
 from pbcs_ompl.core.errors import CallbackFailed, UnsupportedSpace
-from planners.door import Door
-from planners.real_values import bounds, leaves, writer
-from planners.strategy import Space
-from planners.tree import Tree
+from pbcs_ompl.planners.door import Door
+from pbcs_ompl.planners.real_values import bounds, leaves, writer
+from pbcs_ompl.planners.strategy import Space
+from pbcs_ompl.planners.tree import Tree
 
 
 class OmplDoor(Door):

@@ -3,10 +3,10 @@
 import numpy as np
 
 from pbcs_ompl.core.contracts import IndexArray
-from planners.options import positive_integer
-from planners.strategy import Space, Strategy
-from planners.tree import Tree
-from planners.tree_planner import StrategyPlanner
+from pbcs_ompl.planners.options import positive_integer
+from pbcs_ompl.planners.strategy import Space, Strategy
+from pbcs_ompl.planners.tree import Tree
+from pbcs_ompl.planners.tree_planner import StrategyPlanner
 
 
 class Walkers(Strategy):

@@ -4,10 +4,10 @@ import numpy as np
 
 from pbcs_ompl.core.contracts import IndexArray
 from pbcs_ompl.core.errors import InvalidOption
-from planners.kernels import nearest
-from planners.strategy import Space, Strategy
-from planners.tree import Tree
-from planners.tree_planner import StrategyPlanner
+from pbcs_ompl.planners.kernels import nearest
+from pbcs_ompl.planners.strategy import Space, Strategy
+from pbcs_ompl.planners.tree import Tree
+from pbcs_ompl.planners.tree_planner import StrategyPlanner
 
 NODES_PER_BATCH = 100
 

@@ -4,10 +4,10 @@ import numpy as np
 
 from pbcs_ompl.core.contracts import Array, IndexArray
 from pbcs_ompl.core.errors import InvalidOption
-from planners.rrt_nh import NearestToRandom
-from planners.strategy import Space
-from planners.tree import Tree
-from planners.tree_planner import StrategyPlanner
+from pbcs_ompl.planners.rrt_nh import NearestToRandom
+from pbcs_ompl.planners.strategy import Space
+from pbcs_ompl.planners.tree import Tree
+from pbcs_ompl.planners.tree_planner import StrategyPlanner
 
 
 class SteerToRandom(NearestToRandom):

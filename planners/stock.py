@@ -14,8 +14,8 @@ from ompl import util as ou
 
 from pbcs_ompl.bridge.problem import quiet_ompl
 from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable
-from planners.grid_decomposition import grid_over
-from planners.options import check_names, positive_integer
+from pbcs_ompl.planners.grid_decomposition import grid_over
+from pbcs_ompl.planners.options import check_names, positive_integer
 
 
 @dataclass(frozen=True)

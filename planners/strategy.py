@@ -9,8 +9,8 @@ import numpy as np
 
 from pbcs_ompl.core.contracts import Array, IndexArray
 from pbcs_ompl.core.errors import InvalidOption
-from planners.options import check_names, keywords
-from planners.tree import Tree
+from pbcs_ompl.planners.options import check_names, keywords
+from pbcs_ompl.planners.tree import Tree
 
 SHELL_OPTIONS = ("batch", "hold")
 """The options that every planner has beside those of its strategy."""
@@ -81,7 +81,7 @@ class Strategy(ABC):
         Raises:
             InvalidOption: `__init__` knows no such option, or refuses its value.
         """
-        from planners.tree_planner import TreePlanner  # it imports this module
+        from pbcs_ompl.planners.tree_planner import TreePlanner  # it imports this module
 
         strategy = cls.from_options(options, cls.__name__)
         return TreePlanner(si, cls.__name__, strategy, seed=seed, batch=batch, hold=hold)

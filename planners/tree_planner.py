@@ -8,13 +8,13 @@ from ompl import base as ob
 from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere
 from pbcs_ompl.core.errors import CallbackFailed, PbcsError
 from pbcs_ompl.core.seeding import SeedTree
-from planners.compiled import CompiledStep, CompiledStrategy
-from planners.door import Door
-from planners.model_door import ModelDoor, check_finite
-from planners.ompl_door import OmplDoor
-from planners.options import positive_integer
-from planners.strategy import Strategy
-from planners.tree import Tree
+from pbcs_ompl.planners.compiled import CompiledStep, CompiledStrategy
+from pbcs_ompl.planners.door import Door
+from pbcs_ompl.planners.model_door import ModelDoor, check_finite
+from pbcs_ompl.planners.ompl_door import OmplDoor
+from pbcs_ompl.planners.options import positive_integer
+from pbcs_ompl.planners.strategy import Strategy
+from pbcs_ompl.planners.tree import Tree
 
 ErrorType = TypeVar("ErrorType", bound=Exception)
 CHUNK = 2048

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from envs.maze.kernels import CLEARANCE
-from envs.walls_fcl import WallsFcl
 from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.envs.maze.kernels import CLEARANCE
+from pbcs_ompl.envs.walls_fcl import WallsFcl
 
 
 def move_by_fcl(walls: WallsFcl, states: Array, targets: Array, slide: bool) -> tuple[Array, BoolArray]:

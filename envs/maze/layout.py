@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from envs.maze.generate import Passage, passages_of
 from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.envs.maze.generate import Passage, passages_of
 
 THICKNESS = 0.1
 MIN_SIZE, MAX_SIZE = 2, 50

@@ -5,14 +5,14 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from envs.maze import kernels
-from envs.maze.fcl_move import move_by_fcl
-from envs.maze.layout import MazeLayout
-from envs.point_env import MAX_STEP, CompiledStep, PointEnv
-from envs.wall_grid import build_wall_grid
-from envs.walls_fcl import WallsFcl
 from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
+from pbcs_ompl.envs.maze import kernels
+from pbcs_ompl.envs.maze.fcl_move import move_by_fcl
+from pbcs_ompl.envs.maze.layout import MazeLayout
+from pbcs_ompl.envs.point_env import MAX_STEP, CompiledStep, PointEnv
+from pbcs_ompl.envs.wall_grid import build_wall_grid
+from pbcs_ompl.envs.walls_fcl import WallsFcl
 
 CollisionResponse = Literal["stay", "slide"]
 Collision = Literal["kernel", "fcl"]

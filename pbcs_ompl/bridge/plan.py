@@ -22,9 +22,9 @@ from pbcs_ompl.bridge.watch import failure
 from pbcs_ompl.core.contracts import BatchPlanner, Counter, ProgressCallback, ResetAnywhere
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.registry import load_environments
-from pbcs_ompl.core.run_folder import CONFIG, PROVENANCE, RESULT, RunFolder
 from pbcs_ompl.core.seeding import SeedTree
-from pbcs_ompl.reset_anywhere import make, open_model
+from pbcs_ompl.resettable import make, open_model
+from pbcs_ompl.results.folder import CONFIG, PROVENANCE, RESULT, RunFolder
 
 TRAJECTORY = "trajectory.npz"
 TREE = "tree.npz"
@@ -50,7 +50,7 @@ def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
     there to be looked at.
 
     Args:
-        env: A Gymnasium id, an environment, or an adapter of one (see `pbcs_ompl.reset_anywhere`).
+        env: A Gymnasium id, an environment, or an adapter of one (see `pbcs_ompl.resettable`).
         planner: A registered name, `module:attribute`, an `ompl.base.Planner` class, or a factory
             (a strategy class is one).
         env_kwargs: Options of the environment, when `env` is an id.

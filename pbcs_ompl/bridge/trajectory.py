@@ -10,7 +10,7 @@ import numpy as np
 from pbcs_ompl.bridge.versions import environment_versions
 from pbcs_ompl.core.contracts import Array, ResetAnywhere
 from pbcs_ompl.core.errors import DamagedFile, Mismatch
-from pbcs_ompl.core.run_folder import plain, read_arrays, write_arrays
+from pbcs_ompl.results.folder import plain, read_arrays, write_arrays
 
 FORMAT = 1
 

@@ -11,7 +11,7 @@ from ompl import base as ob
 from pbcs_ompl.bridge.layout import blocks, state_reader
 from pbcs_ompl.core.contracts import Array, IndexArray, ResetAnywhere
 from pbcs_ompl.core.errors import DamagedFile
-from pbcs_ompl.core.run_folder import read_arrays, write_arrays
+from pbcs_ompl.results.folder import read_arrays, write_arrays
 
 
 @runtime_checkable

@@ -1,6 +1,6 @@
 """Versions of the packages that a step of an environment depends on."""
 
-from pbcs_ompl.core.provenance import installed
+from pbcs_ompl.results.provenance import installed
 
 ENVIRONMENT = ("pbcs-ompl", "gymnasium")
 PLANNING = ("ompl", "numpy", "numba", "python-fcl")

@@ -10,9 +10,9 @@ from pbcs_ompl.cli.executor import executor
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_comparison
 from pbcs_ompl.cli.terminal import Report, conclude, list_files
-from pbcs_ompl.compare import compare
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
-from pbcs_ompl.core.wording import duration, short
+from pbcs_ompl.core.formatting import duration, short
+from pbcs_ompl.experiments.compare import compare
 
 HEADER = f"{'solved':<10}{'95 % interval':<17}{'transitions':<15}{'seconds':<10}(medians)"
 

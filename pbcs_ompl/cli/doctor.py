@@ -100,7 +100,7 @@ def _environments() -> list[str]:
 
 
 def _check(arguments: Namespace) -> dict[str, Any]:
-    from pbcs_ompl.reset_anywhere import check_resettable, make
+    from pbcs_ompl.resettable import check_resettable, make
 
     model = make(arguments.env, arguments.env_kwargs)
     report = check_resettable(model)

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from pbcs_ompl.cli.terminal import conclude
-from pbcs_ompl.core.run_folder import RunFolder
-from pbcs_ompl.core.wording import percent, short
+from pbcs_ompl.core.formatting import percent, short
 from pbcs_ompl.figures.video import check_video, write_video
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
+from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.evaluation import evaluate
 from pbcs_ompl.skills.training import CHAIN

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.execution import Executor
+from pbcs_ompl.experiments.workers import Executor
 
 
 @contextmanager
@@ -16,7 +16,7 @@ def executor(arguments: Namespace) -> Iterator[int | Executor]:
             raise InvalidOption("--address names a Ray cluster; add --executor ray")
         yield arguments.jobs or 1
     else:
-        from pbcs_ompl.execution.ray import ray_cluster
+        from pbcs_ompl.experiments.workers.ray import ray_cluster
 
         with ray_cluster(arguments.address or "auto", arguments.jobs) as cluster:
             yield cluster

@@ -4,8 +4,8 @@ import sys
 from typing import Any
 
 from pbcs_ompl.core.contracts import Array, ResetAnywhere
-from pbcs_ompl.reset_anywhere.model import FEATURE_KEY, GOAL_KEY
-from pbcs_ompl.reset_anywhere.restorable import RestorableEnv
+from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.model import FEATURE_KEY, GOAL_KEY
 
 
 def describe(model: Any) -> dict[str, Any]:

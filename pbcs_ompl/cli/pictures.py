@@ -10,7 +10,7 @@ from pbcs_ompl.core.errors import PbcsError
 
 if TYPE_CHECKING:
     from pbcs_ompl.bridge.plan import PlanResult
-    from pbcs_ompl.compare import Comparison
+    from pbcs_ompl.experiments.compare import Comparison
     from pbcs_ompl.skills.chain import SkillChain
 
 

@@ -9,10 +9,10 @@ from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.models import note_rules
 from pbcs_ompl.cli.pictures import draw_tree
 from pbcs_ompl.cli.terminal import Report, conclude, list_files
-from pbcs_ompl.core.command_words import environment_words
-from pbcs_ompl.core.wording import duration, short
+from pbcs_ompl.core.formatting import duration, short
 from pbcs_ompl.figures.video import check_video, write_video
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
+from pbcs_ompl.results.command_words import environment_words
 
 
 def run(arguments: Namespace) -> int:

@@ -4,7 +4,7 @@ from argparse import Namespace
 from typing import Any
 
 from pbcs_ompl.cli.terminal import conclude
-from pbcs_ompl.report import write_report
+from pbcs_ompl.results.report import write_report
 
 
 def run(arguments: Namespace) -> int:

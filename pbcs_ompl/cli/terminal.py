@@ -11,8 +11,8 @@ from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from pbcs_ompl.core.run_folder import plain
-from pbcs_ompl.core.wording import duration, short
+from pbcs_ompl.core.formatting import duration, short
+from pbcs_ompl.results.folder import plain
 
 SECONDS_BETWEEN_LINES = 10.0
 

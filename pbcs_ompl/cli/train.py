@@ -11,9 +11,9 @@ from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_chain
 from pbcs_ompl.cli.terminal import Report, conclude, list_files, warn
 from pbcs_ompl.core.errors import InvalidOption, TrainingStalled
-from pbcs_ompl.core.run_folder import CONFIG
-from pbcs_ompl.core.wording import duration, percent, short
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.core.formatting import duration, percent, short
+from pbcs_ompl.resettable import make
+from pbcs_ompl.results.folder import CONFIG
 from pbcs_ompl.skills import TrainResult, resume, train
 
 

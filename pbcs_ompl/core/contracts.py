@@ -32,7 +32,7 @@ class Transition(NamedTuple):
 class ResetAnywhere(Protocol):
     """An environment seen as functions of states: what planners and skills work on.
 
-    One adapter for each family of environments lies in `pbcs_ompl.reset_anywhere`.
+    One adapter for each family of environments lies in `pbcs_ompl.resettable`.
 
     Attributes:
         env_id, env_kwargs: What `gymnasium.make` needs to build the same environment again.

@@ -10,8 +10,8 @@ import numpy as np
 from pbcs_ompl.core.contracts import Array, ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, NoResetAnywhere
 from pbcs_ompl.core.rendering import check_can_render
-from pbcs_ompl.core.run_folder import write_atomically
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
+from pbcs_ompl.results.folder import write_atomically
 
 KINDS = (".mp4", ".gif")
 FRAMES_A_SECOND = 30

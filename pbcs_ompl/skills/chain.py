@@ -8,7 +8,7 @@ import numpy as np
 
 from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray, ResetAnywhere
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
-from pbcs_ompl.core.run_folder import read_arrays, read_json, write_arrays, write_json
+from pbcs_ompl.results.folder import read_arrays, read_json, write_arrays, write_json
 from pbcs_ompl.skills.episodes import with_random_actions
 from pbcs_ompl.skills.goals import ActivationSet, Goal
 from pbcs_ompl.skills.milestones import Milestones

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from pbcs_ompl.core.errors import DamagedFile
-from pbcs_ompl.core.run_folder import plain, read_arrays, write_arrays
+from pbcs_ompl.results.folder import plain, read_arrays, write_arrays
 from pbcs_ompl.skills.method import Snapshot
 
 VERSION = 2

@@ -10,8 +10,8 @@ from pbcs_ompl.bridge.problem import make_problem, quiet_ompl
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.contracts import Counter, ProgressCallback, ResetAnywhere
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, RunFolderError, TrainingStalled, UnknownName
-from pbcs_ompl.core.run_folder import CONFIG, RESULT, RunFolder, read_toml
-from pbcs_ompl.reset_anywhere import make, open_model
+from pbcs_ompl.resettable import make, open_model
+from pbcs_ompl.results.folder import CONFIG, RESULT, RunFolder, read_toml
 from pbcs_ompl.skills.config import TrainConfig
 from pbcs_ompl.skills.result import TrainResult
 from pbcs_ompl.skills.training import CHECKPOINT, Training

@@ -15,8 +15,8 @@ from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.bridge.versions import planning_versions
 from pbcs_ompl.core.contracts import Counter, ProgressCallback, ResetAnywhere
 from pbcs_ompl.core.errors import CallbackFailed, Mismatch, PbcsError
-from pbcs_ompl.core.run_folder import RunFolder, read_json, write_json
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.results.folder import RunFolder, read_json, write_json
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.checkpoint import read_checkpoint, write_checkpoint
 from pbcs_ompl.skills.config import METHODS, WITHOUT_PLAN, TrainConfig

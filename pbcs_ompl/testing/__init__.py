@@ -7,7 +7,7 @@
         assert check_resettable(gymnasium.make("my/Env-v0")).ok
 """
 
-from pbcs_ompl.reset_anywhere import check_resettable
+from pbcs_ompl.resettable import check_resettable
 from pbcs_ompl.testing.solve_rate import SolveRate, assert_solves
 
 __all__ = ["SolveRate", "assert_solves", "check_resettable"]

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit, types
 from numpy.typing import NDArray
 
-from planners.kernels.runs import LENGTH, LOWEST, MEMBER, SIZE, START, append, choose
+from pbcs_ompl.planners.kernels.runs import LENGTH, LOWEST, MEMBER, SIZE, START, append, choose
 
 SMALLEST = 2  # log2 of the rows of a new bin's slice
 CLASSES = 32  # slice sizes 2**0 .. 2**31

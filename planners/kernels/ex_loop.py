@@ -6,11 +6,11 @@ import numpy as np
 from numba import njit, types
 
 from pbcs_ompl.core.contracts import Array, IndexArray
-from planners.compiled import STEP_TYPE
-from planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, make_room_and_add
-from planners.kernels.prefetch import prefetch
-from planners.kernels.runs import MEMBER, choose, peek
-from planners.tree import Columns
+from pbcs_ompl.planners.compiled import STEP_TYPE
+from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, make_room_and_add
+from pbcs_ompl.planners.kernels.prefetch import prefetch
+from pbcs_ompl.planners.kernels.runs import MEMBER, choose, peek
+from pbcs_ompl.planners.tree import Columns
 
 DONE, GOAL, FULL, NOT_FINITE = range(4)
 
@@ -19,7 +19,7 @@ _vector = types.float64[::1]
 _integers = types.int64[::1]
 COLUMNS_TYPE = types.NamedTuple(
     (_matrix, _matrix, _matrix, types.int32[::1], _vector, types.boolean[::1]), Columns)
-"""Numba's type of `planners.tree.Columns`."""
+"""Numba's type of `pbcs_ompl.planners.tree.Columns`."""
 
 
 @njit(cache=True)
@@ -38,7 +38,7 @@ def expand(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims:
     """Expand a node for each row of `uniforms` [B, 2 + A] (bin, node, control); new nodes begin at `first`.
 
     Args:
-        step, parameters: See `planners.compiled.CompiledStep`.
+        step, parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
         feature_dims: Dimensions of the state that are the feature [F].
         bounds: Lower and upper bounds of the controls [2, A].
         columns: The tree's arrays, with room for B more nodes.

@@ -4,8 +4,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planners.kernels.bin_queue import BinQueue, find_cell
-from planners.kernels.runs import LENGTH, MEMBER, START
+from pbcs_ompl.planners.kernels.bin_queue import BinQueue, find_cell
+from pbcs_ompl.planners.kernels.runs import LENGTH, MEMBER, START
 
 
 @njit(cache=True)

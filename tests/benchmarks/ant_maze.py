@@ -14,8 +14,8 @@ import numpy as np
 
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.contracts import Array, Transition
-from pbcs_ompl.reset_anywhere import make
-from planners import Ex
+from pbcs_ompl.planners import Ex
+from pbcs_ompl.resettable import make
 
 SLICES = 4
 """The loop and the planner take turns this often."""

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.compare import compare
+from pbcs_ompl.experiments.compare import compare
 
 RUNS = 20
 ENV, MAZE, PLANNER, TRANSITIONS = "pbcs/Maze-v0", {"size": 15, "maze_seed": 1}, "EST", 50_000

@@ -15,9 +15,9 @@ import numpy as np
 
 from pbcs_ompl.agents import DDPG, DDPGSettings, EpsilonGreedy
 from pbcs_ompl.agents.update import one_thread
-from pbcs_ompl.reset_anywhere import make
-from pbcs_ompl.studies.observers import Probe
-from pbcs_ompl.studies.stacked_training import LoopSettings, StackedTraining
+from pbcs_ompl.experiments.study.observers import Probe
+from pbcs_ompl.experiments.study.stacked_training import LoopSettings, StackedTraining
+from pbcs_ompl.resettable import make
 
 MODEL = make("pbcs/Toy1D-v0")
 SETTINGS = DDPGSettings(hidden=(64, 64), discount=0.99)

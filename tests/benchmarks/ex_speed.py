@@ -26,14 +26,14 @@ from ompl import base as ob
 from ompl import control as oc
 from ompl import util as ou
 
-from envs.maze.layout import MazeLayout
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import PlannerUnavailable
 from pbcs_ompl.core.registry import load
-from pbcs_ompl.reset_anywhere import make
-from planners import Ex
+from pbcs_ompl.envs.maze.layout import MazeLayout
+from pbcs_ompl.planners import Ex
+from pbcs_ompl.resettable import make
 
 MAZE = "pbcs/Maze-v0"
 STOCK = ("RRT", "EST", "KPIECE1", "SyclopRRT", "SyclopEST", "SST", "PDST")

@@ -66,7 +66,7 @@ class Secretive:
 
     @staticmethod
     def build(si, *, seed):
-        from planners import Ex
+        from pbcs_ompl.planners import Ex
 
         class Forgetful(Ex):
             @property

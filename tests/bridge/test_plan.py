@@ -28,8 +28,8 @@ from pbcs_ompl.core.errors import (
     RunFolderError,
     UnknownName,
 )
-from pbcs_ompl.core.run_folder import read_toml
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
+from pbcs_ompl.results.folder import read_toml
 
 MAZE = "pbcs/Maze-v0"
 SUMMARY = ["solved", "transitions", "collision_checks", "seconds", "nodes", "path_length", "replay_ok", "planner",
@@ -293,7 +293,7 @@ MEMORY = """
 import gc, sys
 from ompl import control as oc
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 
 def resident():
     gc.collect()

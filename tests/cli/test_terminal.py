@@ -11,7 +11,7 @@ from rich.console import Console
 
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.terminal import Report, conclude
-from pbcs_ompl.core.wording import duration, short
+from pbcs_ompl.core.formatting import duration, short
 
 
 @pytest.mark.parametrize(("value", "text"), [(1234567, "1,234,567"), (1234.5, "1,234"), (0.12345, "0.123"),

@@ -188,7 +188,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing_behind(pbcs, tmp_path, line, s
 
 
 BROKEN = """
-from planners import Strategy
+from pbcs_ompl.planners import Strategy
 
 class Broken(Strategy):
     def select(self, tree, count):

@@ -7,7 +7,7 @@ import torch
 from pbcs_ompl.agents import NonFiniteData, StackedAgent
 from pbcs_ompl.core import registry
 from pbcs_ompl.core.errors import InvalidOption, Mismatch, UnknownName, UnsupportedSpace
-from pbcs_ompl.reset_anywhere import make as open_model
+from pbcs_ompl.resettable import make as open_model
 from pbcs_ompl.skills import SkillChain, train
 
 LOW, HIGH = [-1.0, 0.0], [0.5, 10.0]

@@ -14,8 +14,8 @@ from pbcs_ompl.core.contracts import ResetAnywhere
 from pbcs_ompl.core.errors import MissingDependency
 from pbcs_ompl.core.registry import load_environments
 from pbcs_ompl.core.rendering import check_can_render
-from pbcs_ompl.reset_anywhere import check_resettable, make
-from pbcs_ompl.reset_anywhere.adapt import MODEL_MEMBERS
+from pbcs_ompl.resettable import check_resettable, make
+from pbcs_ompl.resettable.adapt import MODEL_MEMBERS
 
 load_environments()
 ENV_IDS = sorted(env_id for env_id in gymnasium.registry if env_id.startswith("pbcs/"))

@@ -9,7 +9,7 @@ from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.core import registry
 from pbcs_ompl.core.contracts import BatchPlanner, Counter, PlannerFactory
 from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 
 BUDGET = 60_000
 

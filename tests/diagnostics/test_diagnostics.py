@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pbcs_ompl import diagnostics as d
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 
 LOW, HIGH = np.array([-0.1]), np.array([0.1])
 STATES = np.linspace(0.0, 1.0, 50)[None, :, None]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import envs  # noqa: F401 - registers
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 
 TOY, DRIFT = make("pbcs/Toy1D-v0"), make("pbcs/Drift-v0")
 position = st.floats(0.0, 1.0)

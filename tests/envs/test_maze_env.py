@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import envs  # noqa: F401 - registers
-from envs.maze.kernels import CLEARANCE
-from envs.maze.layout import MazeLayout
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
+from pbcs_ompl.envs.maze.kernels import CLEARANCE
+from pbcs_ompl.envs.maze.layout import MazeLayout
 
 
 def make(**kwargs: object) -> gymnasium.Env:
@@ -187,6 +187,6 @@ def test_vector_environments_work() -> None:
 
 
 def test_importing_envs_is_light() -> None:
-    code = "import envs, sys; print([m for m in ('numba', 'fcl', 'scipy') if m in sys.modules])"
+    code = "import pbcs_ompl.envs, sys; print([m for m in ('numba', 'fcl', 'scipy') if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"

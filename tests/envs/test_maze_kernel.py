@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import envs  # noqa: F401 - registers
-from envs.maze import kernels
-from envs.maze.maze import MazeEnv
+from pbcs_ompl.envs.maze import kernels
+from pbcs_ompl.envs.maze.maze import MazeEnv
 
 # Coordinates on a coarse lattice, so that segments often touch corners and edges exactly.
 lattice = st.integers(-8, 8).map(lambda n: n / 8)

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from envs.maze.generate import passages_of, recursive_backtracker
-from envs.maze.layout import MazeLayout
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.envs.maze.generate import passages_of, recursive_backtracker
+from pbcs_ompl.envs.maze.layout import MazeLayout
 
 
 @given(size=st.integers(2, 12), seed=st.integers(0, 2**31))

@@ -12,11 +12,11 @@ from pbcs_ompl.core.rendering import prefer_headless_rendering
 prefer_headless_rendering()
 mujoco = pytest.importorskip("mujoco")
 
-from envs.ant_maze import AntMazeEnv
-from envs.maze.layout import MazeLayout
-from envs.sparse_half_cheetah import CHEETAH, X_SPEED, SparseHalfCheetahEnv, X, cheetah
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
+from pbcs_ompl.envs.ant_maze import AntMazeEnv
+from pbcs_ompl.envs.maze.layout import MazeLayout
+from pbcs_ompl.envs.sparse_half_cheetah import CHEETAH, X_SPEED, SparseHalfCheetahEnv, X, cheetah
 
 ENVS = [AntMazeEnv, SparseHalfCheetahEnv]
 
@@ -174,7 +174,7 @@ def test_only_speed_is_rewarded() -> None:
 
 
 def test_perturbed_ants_stand_on_their_feet() -> None:
-    from pbcs_ompl.reset_anywhere import make
+    from pbcs_ompl.resettable import make
 
     model = make("pbcs/AntMaze-v0")
     state = model.initial_state(0)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from envs.maze import kernels
-from envs.wall_grid import CELLS_PER_UNIT, build_wall_grid
+from pbcs_ompl.envs.maze import kernels
+from pbcs_ompl.envs.wall_grid import CELLS_PER_UNIT, build_wall_grid
 
 REACH = 0.1
 on_cell_edges = st.integers(0, 3 * CELLS_PER_UNIT).map(lambda n: n / CELLS_PER_UNIT)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from envs.maze import kernels
-from envs.maze.layout import MazeLayout
-from envs.walls_fcl import SEGMENT_RADIUS, WallsFcl
+from pbcs_ompl.envs.maze import kernels
+from pbcs_ompl.envs.maze.layout import MazeLayout
+from pbcs_ompl.envs.walls_fcl import SEGMENT_RADIUS, WallsFcl
 
 THICKNESSES = (1e-4, 1e-3, 0.1)
 SLACK = 2.0 * SEGMENT_RADIUS

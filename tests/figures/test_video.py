@@ -14,7 +14,7 @@ from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, NoResetAnywhere
 from pbcs_ompl.core.rendering import check_can_render, prefer_headless_rendering
 from pbcs_ompl.figures.video import check_video, write_video
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 
 MAZE = make("pbcs/Maze-v0")
 STATES = np.linspace([0.5, 0.5], [1.5, 0.5], 12)

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.kernels.bin_queue import empty_queue, insert, select, tied_bins
-from planners.kernels.runs import COUNT, LENGTH, MEMBER, START
+from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert, select, tied_bins
+from pbcs_ompl.planners.kernels.runs import COUNT, LENGTH, MEMBER, START
 
 
 class Algorithm5:

@@ -5,7 +5,7 @@ import pytest
 from ompl import base as ob
 
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption
-from planners import Ex
+from pbcs_ompl.planners import Ex
 
 EXACT, TIMEOUT = ob.PlannerStatus.EXACT_SOLUTION, ob.PlannerStatus.TIMEOUT
 

@@ -5,7 +5,7 @@ import pytest
 
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import InvalidOption
-from planners import RRTNH, ESTAdapted, Ex, RandomWalk
+from pbcs_ompl.planners import RRTNH, ESTAdapted, Ex, RandomWalk
 
 MAZE = {"env_kwargs": {"size": 3}}
 

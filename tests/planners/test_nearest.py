@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.kernels import nearest
+from pbcs_ompl.planners.kernels import nearest
 
 
 def fill(points):

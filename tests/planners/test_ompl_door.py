@@ -8,7 +8,7 @@ from ompl import base as ob
 from ompl import control as oc
 
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, UnsupportedSpace
-from planners import RRTNH, ESTAdapted, Ex, RandomWalk, RRTSteered
+from pbcs_ompl.planners import RRTNH, ESTAdapted, Ex, RandomWalk, RRTSteered
 
 
 def bounds(low, high, size=2):

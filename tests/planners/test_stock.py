@@ -5,7 +5,7 @@ from ompl import base as ob
 from ompl import control as oc
 
 from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable
-from planners import stock
+from pbcs_ompl.planners import stock
 
 BUILDABLE = ("RRT", "EST", "KPIECE1")
 

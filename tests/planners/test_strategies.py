@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.core.errors import InvalidOption
-from planners import RRTNH, ESTAdapted, RandomWalk, RRTSteered, Space, Tree
-from planners.est_adapted import SparseFirst
-from planners.rrt_nh import NearestToRandom
+from pbcs_ompl.planners import RRTNH, ESTAdapted, RandomWalk, RRTSteered, Space, Tree
+from pbcs_ompl.planners.est_adapted import SparseFirst
+from pbcs_ompl.planners.rrt_nh import NearestToRandom
 
 
 def space(features=2, **others):

@@ -6,7 +6,7 @@ from ompl import base as ob
 
 from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, Mismatch
-from planners import RRTNH, ESTAdapted, Ex, RandomWalk, RRTSteered, Strategy, Tree
+from pbcs_ompl.planners import RRTNH, ESTAdapted, Ex, RandomWalk, RRTSteered, Strategy, Tree
 
 OURS = [Ex, RRTNH, RRTSteered, ESTAdapted, RandomWalk]
 EXACT, TIMEOUT, ABORT = (ob.PlannerStatus.EXACT_SOLUTION, ob.PlannerStatus.TIMEOUT, ob.PlannerStatus.ABORT)

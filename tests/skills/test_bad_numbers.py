@@ -7,7 +7,7 @@ from gymnasium.spaces import Box
 
 from pbcs_ompl.agents import NonFiniteData
 from pbcs_ompl.core.errors import TrainingStalled
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 from pbcs_ompl.skills import resume, train, training
 from pbcs_ompl.skills.checkpoint import read_checkpoint
 

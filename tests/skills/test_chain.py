@@ -7,7 +7,7 @@ import pytest
 
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.evaluation import evaluate
 from pbcs_ompl.skills.goals import Ball, Target

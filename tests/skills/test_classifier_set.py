@@ -5,7 +5,7 @@ import pytest
 
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 from pbcs_ompl.skills import SkillChain, SkillSettings, resume, train
 from pbcs_ompl.skills.chain import Skill
 from pbcs_ompl.skills.classifier_set import REACH, ClassifierSet, learn_set

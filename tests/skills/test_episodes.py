@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 from pbcs_ompl.skills.episodes import run_episodes, with_random_actions
 from pbcs_ompl.skills.goals import Ball, Target
 from pbcs_ompl.skills.shaping import GOAL_REWARD

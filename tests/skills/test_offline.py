@@ -5,7 +5,7 @@ import pytest
 
 from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import InvalidOption, TrainingStalled
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 from pbcs_ompl.skills import train
 from pbcs_ompl.skills.config import TrainConfig
 from pbcs_ompl.skills.exploration import explore

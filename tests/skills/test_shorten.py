@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
 from pbcs_ompl.skills.shorten import shorten
 
 MODEL = make("pbcs/Maze-v0", {"size": 2})

@@ -19,8 +19,8 @@ from pbcs_ompl.core.errors import (
     TrainingStalled,
     UnknownName,
 )
-from pbcs_ompl.core.run_folder import read_toml
-from pbcs_ompl.reset_anywhere import make
+from pbcs_ompl.resettable import make
+from pbcs_ompl.results.folder import read_toml
 from pbcs_ompl.skills import SkillChain, resume, train
 from pbcs_ompl.skills.policy import policy_to_arrays
 

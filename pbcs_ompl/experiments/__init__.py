@@ -1,0 +1,1 @@
+"""Experiments: planners compared, studies run, and where the runs are executed."""

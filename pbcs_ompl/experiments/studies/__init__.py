@@ -1,0 +1,1 @@
+"""The studies: each a package with `sweep.toml`, `study.py` and `analysis.py`."""

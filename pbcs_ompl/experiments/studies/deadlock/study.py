@@ -1,0 +1,95 @@
+"""Why DDPG fails on the simplest problem there is: [Matheron2020] Figs. 6.2-6.5, 6.9(b), 6.10(a,b)."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl.agents.noise import make_noise
+from pbcs_ompl.agents.stacked_agent import StackedAgent
+from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.registry import load
+from pbcs_ompl.diagnostics import value_slices
+from pbcs_ompl.experiments.study.joined import chunks
+from pbcs_ompl.experiments.study.observers import Probe
+from pbcs_ompl.experiments.study.stacked_training import LoopSettings, StackedTraining
+from pbcs_ompl.resettable import make
+
+MAPPED_STATES = np.linspace(0.0, 1.0, 101)
+HORIZON = 50
+MOST_CRITICS = 2
+
+
+def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
+    """One run for each stack of each variant, and one on Drift."""
+    common = {"agent_settings": sweep["agent"], "device": sweep["device"]}
+    stack = sweep["stack"][sweep["device"].partition(":")[0]]
+    stacks = [{"name": f"{variant}-{chunk[0]}-{chunk[-1]}", "variant": variant, "seeds": chunk, "loop": sweep["loop"],
+               **common, **options}
+              for variant, options in sweep["variants"].items()
+              for chunk in chunks(min(seeds, options.get("most_seeds", seeds)), stack)]
+    return [*stacks, {"name": "drift", "variant": "drift", "agent": "ddpg", "drift": sweep["drift"], **common}]
+
+
+def run(settings: dict[str, Any]) -> dict[str, Any]:
+    """Train one stack on 1D-Toy, or let one drift."""
+    if settings["variant"] == "drift":
+        return _drift(settings)
+    model = make("pbcs/Toy1D-v0")
+    agent, probe = _agent(settings, model, settings["seeds"]), Probe(model)
+    discount = settings["agent_settings"]["discount"]
+    observers = probe.observers() | {
+        "distance_to_returns": lambda agent: probe.distance_to_returns(agent, discount, HORIZON)}
+    expert_after = settings.get("expert_after")
+    expert: Callable[[Array], Array] | None = None if expert_after is None else (
+        lambda states: np.broadcast_to(model.action_low, (len(states), 1)))
+    loop = LoopSettings(**settings["loop"], expert_after=expert_after or 0)
+    training = StackedTraining(model, agent, make_noise(settings["noise"]), loop, expert=expert, observers=observers)
+    curves = training.run()
+    failed = np.flatnonzero(~curves.success[-1][training.active])
+    return {"variant": settings["variant"], "loop": settings["loop"], "expert_after": expert_after, **curves.summary(),
+            "critics": _critics(training.agent, failed[:MOST_CRITICS]) if len(failed) else []}
+
+
+def _agent(settings: dict[str, Any], model: ResetAnywhere, seeds: list[int]) -> StackedAgent:
+    kind = load("agent", settings["agent"])
+    # A GPU's update would be compiled anew each time that the stack shrinks.
+    return kind(model.observation_size, model.action_low, model.action_high, seeds=seeds, device=settings["device"],
+                settings=kind.settings_type(**settings["agent_settings"]),
+                compile="auto" if settings["device"] == "cpu" else False)
+
+
+def _critics(agent: StackedAgent, failed: Array) -> list[dict[str, Any]]:
+    """Return Q along the states and the actions, and the actor's actions, of some failed seeds of the stack."""
+    states = np.broadcast_to(MAPPED_STATES[:, None], (len(agent.seeds), len(MAPPED_STATES), 1))
+    line, values = value_slices(agent.value, states, agent.action_low, agent.action_high)
+    actions = agent.act(states)[..., 0]
+    return [{"seed": agent.seeds[index], "states": MAPPED_STATES.tolist(), "actions": line.tolist(),
+             "values": values[index].round(5).tolist(), "chosen": actions[index].tolist()} for index in failed]
+
+
+def _fill_without_reward(agent: StackedAgent, count: int) -> None:
+    """Fill the replay buffers with random transitions of Drift."""
+    model, shape = make("pbcs/Drift-v0"), (len(agent.seeds) * count, 1)
+    rng = np.random.default_rng(0)
+    states, controls = rng.uniform(0.0, 1.0, shape), rng.uniform(model.action_low, model.action_high, shape)
+    outcome = model.transition(states, controls)
+    agent.remember(*(values.reshape(len(agent.seeds), count, *values.shape[1:]) for values in (
+        states, controls, outcome.rewards, outcome.states, outcome.terminated)))
+
+
+def _drift(settings: dict[str, Any]) -> dict[str, Any]:
+    """Train on random transitions without any reward; take down how far actor and critic go."""
+    model, drift = make("pbcs/Drift-v0"), settings["drift"]
+    seeds = list(range(drift["seeds"]))
+    agent, probe = _agent(settings, model, seeds), Probe(model)
+    _fill_without_reward(agent, drift["transitions"])
+    rows = {"largest_value": [probe.largest_value(agent)], "largest_action": [probe.largest_action(agent)]}
+    for _ in range(drift["updates"] // drift["every"]):
+        agent.train(drift["every"])
+        rows["largest_value"].append(probe.largest_value(agent))
+        rows["largest_action"].append(probe.largest_action(agent))
+    steps = np.arange(len(rows["largest_value"])) * drift["every"]
+    curves = {name: np.array(row).tolist() for name, row in rows.items()}
+    return {"variant": "drift", "updates": steps.tolist(), **curves}
+

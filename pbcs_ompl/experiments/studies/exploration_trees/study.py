@@ -1,0 +1,77 @@
+"""Trees that do not stop at a goal, and the first path to it: [Matheron2020] Figs. 3.2-3.4, 4.2 and 4.3."""
+
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl.bridge.plan import plan
+from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.resettable import make
+from pbcs_ompl.skills.exploration import without_goal
+
+PICTURED_SEED = 0
+SAMPLES = 8
+"""Points along each edge of a cell that tell how much of it can be reached."""
+
+
+def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
+    """One run for each scene, planner and seed."""
+    return [{"name": f"{scene}-{planner}-{seed}", "scene": scene, "planner": planner, "seed": seed,
+             "cell": sweep["cell"], "circle": sweep["circle"], **options}
+            for scene, options in sweep["scenes"].items() for planner in sweep["planners"] for seed in range(seeds)]
+
+
+def run(settings: dict[str, Any]) -> dict[str, Any]:
+    """Explore without a goal, and search for it where there is one."""
+    model = make(settings["env"], settings.get("env_kwargs", {}))
+    planner, seed = settings["planner"], settings["seed"]
+    tree = plan(without_goal(model), planner, seed=seed, max_transitions=settings["transitions"]).tree
+    counts, areas = cells(model, tree.states, settings["cell"])
+    record = {**settings, "nodes": len(tree.states), "coverage": coverage(counts, areas),
+              "evenness": evenness(counts, areas), "density": density(tree.states, settings["circle"])}
+    if seed == PICTURED_SEED:
+        record |= {"states": tree.states.tolist(), "parents": tree.parents.tolist()}
+    if model.goal_circle is not None:
+        found = plan(model, planner, seed=seed, max_transitions=100_000)
+        path = None if found.trajectory is None else found.trajectory.states
+        record |= {"first_reward": found.transitions if found.solved else None, "path_length": found.path_length}
+        if seed == PICTURED_SEED and path is not None:
+            record |= {"found_states": found.tree.states.tolist(), "found_parents": found.tree.parents.tolist(),
+                       "path": path.tolist()}
+    return record
+
+
+def cells(model: ResetAnywhere, states: Array, cell: float) -> tuple[Array, Array]:
+    """Return, for each square cell, the number of states in it and how much of it can be reached, in [0, 1]."""
+    low, high = model.state_low, model.state_high
+    shape = np.round((high - low) / cell).astype(int)
+    index = np.minimum(((states - low) / cell).astype(int), shape - 1)
+    counts = np.zeros(shape)
+    np.add.at(counts, tuple(index.T), 1)
+    edges = np.meshgrid(*((np.arange(count * SAMPLES) + 0.5) / SAMPLES * cell for count in shape), indexing="ij")
+    valid = model.is_valid(low + np.stack(edges, axis=-1).reshape(-1, len(low)))
+    areas = valid.reshape(shape[0], SAMPLES, shape[1], SAMPLES).mean(axis=(1, 3))
+    return counts.ravel(), areas.ravel()
+
+
+def evenness(counts: Array, areas: Array) -> float:
+    """Return how evenly a tree fills what can be reached: exp(-KL(p, q)), 1 when it is uniform.
+
+    p is the share of the states in each cell, q that of the reachable area. A tree that is uniform over a part of the
+    area, and nowhere else, has the evenness of that part's share. States in cells that count as unreachable, for a
+    corner of them is reachable that no sample met, are left out.
+    """
+    counted = (counts > 0) & (areas > 0)
+    p, q = counts[counted] / counts[counted].sum(), areas[counted] / areas.sum()
+    return float(np.exp(-(p * np.log(p / q)).sum()))
+
+
+def coverage(counts: Array, areas: Array) -> float:
+    """Return the share of the cells that can be reached to at least a half in which there is a state."""
+    return float((counts > 0)[areas >= 0.5].mean())
+
+
+def density(states: Array, circle: tuple[float, float, float]) -> float:
+    """Return the number of states in a circle (x, y, radius) for each unit of its area."""
+    x, y, radius = circle
+    return float((np.hypot(*(states - (x, y)).T) <= radius).sum() / (np.pi * radius**2))

@@ -1,0 +1,194 @@
+"""The table of mazes as figures and claims."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.patches import Circle
+from scipy.stats import binomtest
+
+from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.study.paired import FEWEST, SURE
+from pbcs_ompl.figures.by_group import rates_figure, values_figure
+from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED, new_figure, save
+from pbcs_ompl.figures.chain import chain_figure
+from pbcs_ompl.figures.maze import furnish, plane
+from pbcs_ompl.resettable import make
+
+Records = list[dict[str, Any]]
+ALONE = ("DDPG", "TD3")
+BARS = (((2, 3, 4, 5, 7), 0.95, "[Matheron2020] 7.4: PBCS solves mazes up to 7x7; the bar is ours"),
+        ((10, 15), 0.8, "ours: beyond [Matheron2020]"))
+MILLION = 1_000_000
+"""[Matheron2020] 5.6: a run succeeds within so many transitions, planning included."""
+COLOURS = {True: "#e3f4e3", False: "#fbe3e3"}
+"""Backgrounds of solved and unsolved pictures, as in Fig. 7.3."""
+
+
+def analyse(records: Records, figures: Path) -> list[Claim]:
+    """Draw Figs. 7.3 and 7.4 and the rates behind them; compare the methods."""
+    _draw_rates(records, figures)
+    _draw_table(records, figures)
+    for record in _of(records, "PBCS"):
+        if "rollout" in record:
+            _draw_chain(record, figures)
+    return [*_bars(records), *_alone(records), *_backplay(records), *_compared(records), _skills(records)]
+
+
+def _sizes(records: Records) -> list[int]:
+    return sorted({record["size"] for record in records})
+
+
+def _of(records: Records, label: str, *sizes: int) -> Records:
+    return [record for record in records if record["label"] == label and (not sizes or record["size"] in sizes)]
+
+
+def _solved(records: Records, key: str = "solved") -> dict[str, Any]:
+    return rate(sum(record[key] for record in records), len(records))
+
+
+def _any_solved(records: Records) -> bool | None:
+    """Return whether any of them is solved; None when there are too few to say that there is none."""
+    solved = any(record["solved"] for record in records)
+    return solved if solved or len(records) >= FEWEST else None
+
+
+def _by_size(records: Records, label: str) -> dict[str, Any]:
+    return {f"{size}x{size}": _solved(_of(records, label, size)) for size in _sizes(_of(records, label))}
+
+
+def _bars(records: Records) -> list[Claim]:
+    claims = []
+    for sizes, bar, source in BARS:
+        solved = {f"{size}x{size}": _solved(_of(records, "PBCS", size)) for size in sizes}
+        rates = [one["rate"] for one in solved.values() if one["n"]]
+        missed = [f"{r['size']}x{r['size']} seed {r['seed']}: {_reason(r)}" for r in _of(records, "PBCS", *sizes)
+                  if not r["solved"]]
+        names = ", ".join(f"{size}x{size}" for size in sizes)
+        claims.append(Claim(f"PBCS solves at least {bar:.0%} of the mazes of each of the sizes {names}",
+                            min(rates) >= bar if rates else None, solved, source, "; ".join(missed)))
+    return claims
+
+
+def _reason(record: dict[str, Any]) -> str:
+    if record["stalled"]:
+        return str(record["stalled"])
+    return (f"{record['success_rate']:.0%} of the noisy executions arrive, "
+            f"{record['nominal_success_rate']:.0%} of those without noise")
+
+
+def _alone(records: Records) -> list[Claim]:
+    claims = []
+    for label in ALONE:
+        small = _of(records, label, 2)
+        claims += [_fails_from_3x3(records, label, f"{label} alone"),
+                   Claim(f"{label} alone solves some 2x2 mazes within a million transitions",
+                         _any_solved(small), _counts(small),
+                         "[Matheron2020] 7.4: all but the simplest mazes are too hard")]
+    return claims
+
+
+def _fails_from_3x3(records: Records, label: str, name: str) -> Claim:
+    large = [record for record in _of(records, label) if record["size"] > 2]
+    solved = _any_solved(large)
+    return Claim(f"{name} solves no maze from 3x3 on within a million transitions",
+                 None if solved is None else not solved, {**_counts(large), **_by_size(large, label)},
+                 "[Matheron2020] 7.4")
+
+
+def _counts(records: Records) -> dict[str, Any]:
+    return {"solved": _solved(records), "arrive once, at the end, without noise": _solved(records, "arrives")}
+
+
+def _backplay(records: Records) -> list[Claim]:
+    small = _of(records, "PB", 2)
+    backplay, alone = _solved(small), _solved(_of(records, "DDPG", 2))
+    return [_fails_from_3x3(records, "PB", "PB"),
+            Claim("PB regularly fails in 2x2 mazes (in at least one run of ten)",
+                  backplay["rate"] <= 0.9 if len(small) >= FEWEST else None, _counts(small), "[Matheron2020] 5.6"),
+            Claim("PB solves 2x2 mazes much more often than DDPG alone (the intervals lie apart)",
+                  backplay["wilson"][0] > alone["wilson"][1] if min(backplay["n"], alone["n"]) >= FEWEST else None,
+                  {"PB": backplay, "DDPG": alone}, "[Matheron2020] 5.6, Fig. 5.3")]
+
+
+def _compared(records: Records) -> list[Claim]:
+    """Compare PBCS with the others where both have run, by the exact McNemar test."""
+    pbcs = {(r["size"], r["seed"]): r["solved"] and r["transitions"] <= MILLION for r in _of(records, "PBCS")}
+    claims = []
+    for label in ("PB", *ALONE):
+        pairs = [(pbcs[r["size"], r["seed"]], r["solved"]) for r in _of(records, label)
+                 if (r["size"], r["seed"]) in pbcs]
+        ours, theirs = (sum(one > other for one, other in pairs), sum(one < other for one, other in pairs))
+        chance = binomtest(ours, ours + theirs, alternative="greater").pvalue if ours + theirs else 1.0
+        claims.append(Claim(f"within the same million transitions PBCS solves more mazes than {label} (p < {SURE})",
+                            bool(chance < SURE) if len(pairs) >= FEWEST else None,
+                            {"PBCS": rate(sum(one for one, _ in pairs), len(pairs)),
+                             label: rate(sum(other for _, other in pairs), len(pairs)),
+                             f"only PBCS, only {label}": [ours, theirs], "p (McNemar, exact)": float(chance)},
+                            "[Matheron2020] 7.4"))
+    return claims
+
+
+def _skills(records: Records) -> Claim:
+    solved = [record for record in _of(records, "PBCS") if record["solved"]]
+    medians = {f"{size}x{size}": float(np.median([r["skills"] for r in _of(solved, "PBCS", size)]))
+               for size in _sizes(solved)}
+    steps = np.diff(list(medians.values()))
+    return Claim("PBCS chains more skills in larger mazes (the median grows from each size to the next)",
+                 bool((steps > 0).all()) if len(steps) else None, {"skills, median": medians, "runs": len(solved)},
+                 "[Matheron2020] 7.4, Fig. 7.4")
+
+
+def _draw_rates(records: Records, figures: Path) -> None:
+    budgets = {record["label"]: f"{record['label']} {record['max_transitions'] / MILLION:g} M" for record in records}
+    groups = {label: {f"{size}x{size}": _of(records, label, size) for size in _sizes(_of(records, label))}
+              for label in budgets}
+    counts = {label: {size: (sum(r["solved"] for r in runs), len(runs)) for size, runs in sizes.items()}
+              for label, sizes in groups.items()}
+    title = f"Solved mazes; at most {', '.join(budgets.values())} transitions"
+    save(rates_figure(counts, title=title), figures / "success.png")
+    costs = {label: {size: [r["transitions"] for r in runs if r["solved"]] for size, runs in sizes.items()}
+             for label, sizes in groups.items()}
+    save(values_figure(costs, title="What solved runs cost, planning included", ylabel="transitions", log=True),
+         figures / "transitions.png")
+    skills = {"PBCS": {f"{size}x{size}": [r["skills"] for r in _of(records, "PBCS", size) if r["solved"]]
+                       for size in _sizes(records)}}
+    save(values_figure(skills, title="Skills in the chains of solved runs", ylabel="skills"), figures / "skills.png")
+
+
+def _draw_table(records: Records, figures: Path) -> None:
+    """Draw the first seed of every method and size, as Fig. 7.3."""
+    pictured = [record for record in records if "rollout" in record]
+    sizes, labels = _sizes(pictured), list(dict.fromkeys(record["label"] for record in pictured))
+    figure, whole = new_figure(2.2 * max(1, len(sizes)), 2.5 * max(1, len(labels)))
+    whole.remove()
+    for record in pictured:
+        place = labels.index(record["label"]) * len(sizes) + sizes.index(record["size"]) + 1
+        _draw_one(record, figure.add_subplot(len(labels), len(sizes), place))
+    figure.suptitle("Numbers: transitions; green background: solved; red: plan; green: the policy without noise; "
+                    "purple: activation sets", fontsize=11)
+    save(figure, figures / "mazes.png")
+
+
+def _draw_one(record: dict[str, Any], axes: Any) -> None:
+    model = make("pbcs/Maze-v0", record["env_kwargs"])
+    furnish(axes, model)
+    axes.set_facecolor(COLOURS[record["solved"]])
+    axes.set_xticks([])
+    axes.set_yticks([])
+    for key, colour, width in (("plan", RED, 0.6), ("rollout", GREEN, 1.4)):
+        if record[key] is not None:
+            axes.plot(*plane(model, np.array(record[key])).T, color=colour, linewidth=width, zorder=3)
+    for centre, radius in record["activations"]:
+        axes.add_patch(Circle(tuple(plane(model, np.array(centre))[0]), radius, fill=False, edgecolor=PURPLE, zorder=4,
+                              linewidth=0.8))
+    axes.set_title(f"{record['label']}, {record['transitions']:,}", fontsize=9)
+
+
+def _draw_chain(record: dict[str, Any], figures: Path) -> None:
+    size = record["size"]
+    figure = chain_figure(make("pbcs/Maze-v0", record["env_kwargs"]), trajectory=np.array(record["plan"]),
+                          rollout=np.array(record["rollout"]),
+                          activations=[(np.array(centre), radius) for centre, radius in record["activations"]],
+                          title=f"PBCS, {record['transitions']:,} transitions, seed {record['seed']} (Fig. 7.4)")
+    save(figure, figures / f"chain-{size}x{size}.png")

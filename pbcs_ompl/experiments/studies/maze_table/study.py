@@ -1,0 +1,38 @@
+"""Trainings in mazes of growing size: [Matheron2020] 7.3 and 7.4."""
+
+from typing import Any
+
+from pbcs_ompl.experiments.study.trained import trained
+from pbcs_ompl.resettable import make
+from pbcs_ompl.skills import TrainResult
+
+PICTURED_INDEX = 0
+
+
+def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
+    """One run for each seed, size and method: PBCS first, then the others seed by seed, so that a part is balanced."""
+    common = {"preset": sweep["preset"], "wall_penalty": sweep["wall_penalty"]}
+    chosen = [{"name": f"{name}-{size}-{index}", "label": name, "size": int(size), "index": index,
+               "seed": sweep["first_seed"] + index, "method": method["method"], "agent": method["agent"],
+               "max_transitions": method["max_transitions"], "episode_steps": options["episode_steps"], **common}
+              for index in range(seeds) for size, options in sweep["sizes"].items()
+              for name, method in sweep["methods"].items() if index < min(method["seeds"], options["seeds"])]
+    return sorted(chosen, key=lambda settings: settings["method"] != "pbcs")
+
+
+def run(settings: dict[str, Any]) -> dict[str, Any]:
+    """Train once; take down what it cost and whether the policy arrives."""
+    size, seed = settings["size"], settings["seed"]
+    kwargs = {"size": size, "wall_penalty": settings["wall_penalty"]} | ({"maze_seed": seed} if size > 3 else {})
+    changes = {} if settings["method"] == "pbcs" else {"max_steps": settings["episode_steps"]}
+    record, result = trained("pbcs/Maze-v0", kwargs, settings=changes, seed=seed,
+                             **{key: settings[key] for key in ("method", "agent", "preset", "max_transitions")})
+    pictured = settings["index"] == PICTURED_INDEX and result.chain is not None
+    return settings | record | (_picture(result, kwargs) if pictured else {})
+
+
+def _picture(result: TrainResult, kwargs: dict[str, Any]) -> dict[str, Any]:
+    return {"plan": None if result.trajectory is None else result.trajectory.states.tolist(),
+            "rollout": result.chain.rollout(make("pbcs/Maze-v0", kwargs)).tolist(),
+            "activations": [[skill.activation.center.tolist(), skill.activation.radius]
+                            for skill in result.chain.skills]}

@@ -1,0 +1,119 @@
+"""Figures and claims about what DDPG makes of an exploration."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import LineCollection
+
+from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.figures.canvas import new_figure, save
+from pbcs_ompl.figures.critic import critic_figure
+from pbcs_ompl.figures.diagnostics import success_figure
+from pbcs_ompl.figures.maze import furnish
+from pbcs_ompl.resettable import make
+
+
+def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
+    """Draw critics and curves; compare the variants."""
+    batches = [record for record in records if record["variant"] == "mini-batch"]
+    trained = [record for record in records if record["variant"] != "mini-batch"]
+    tables = {}
+    for variant in dict.fromkeys(record["variant"] for record in trained):
+        chosen = [record for record in trained if record["variant"] == variant]
+        tables[variant] = (np.array(chosen[0]["at"]), np.concatenate([r["success"] for r in chosen], axis=1) > 0)
+        _draw(next((record for record in chosen if 0 in record["seeds"]), chosen[0]), figures)
+    save(success_figure(tables, title="2x2 and 3x3 maze: solved by the policy without noise",
+                        xlabel="steps of each seed; offline DDPG: updates"), figures / "success.png")
+    ever = {variant: rate(success.any(axis=0).sum(), success.shape[1]) for variant, (_, success) in tables.items()}
+    last = {variant: rate(success[-1].sum(), success.shape[1]) for variant, (_, success) in tables.items()}
+    return [*_alone(ever, last), *_compared(ever, last, tables),
+            *(_little_of_the_wall(record, figures) for record in batches[-1:])]
+
+
+def _alone(ever: dict[str, Any], last: dict[str, Any]) -> list[Claim]:
+    thick = "the walls are 0.1 thick here; layer norm decides, see the variants without it"
+    expected = {
+        "plain": ("DDPG alone does not solve the 2x2 maze within 10 000 steps", False, "Fig. 4.1", ""),
+        "offline": ("offline DDPG does not solve the 2x2 maze", False, "Fig. 4.4", thick),
+        "offline-without-layer-norm": ("nor does it without layer norm", False, "Fig. 4.4", ""),
+        "bootstrapped": ("bootstrapped DDPG solves the 2x2 maze at some time", True, "Fig. 4.5", ""),
+        "bootstrapped-without-layer-norm": ("so it does without layer norm", True, "Fig. 4.5", ""),
+        "bootstrapped-3x3": ("in the 3x3 maze bootstrapped DDPG falls short", False, "Fig. 4.6, for a larger maze", "")}
+    return [Claim(f"{claim} ({'more' if solves else 'less'} than half of the seeds)",
+                  (ever[variant]["rate"] > 0.5) == solves and ever[variant]["rate"] != 0.5,
+                  {"solved at some evaluation": ever[variant], "solved at the last": last[variant]},
+                  f"[Matheron2020] {source}", note)
+            for variant, (claim, solves, source, note) in expected.items() if variant in ever]
+
+
+def _compared(ever: dict[str, Any], last: dict[str, Any], tables: dict[str, Any]) -> list[Claim]:
+    claims = []
+    for ending in ("", "-without-layer-norm"):
+        one, other = f"bootstrapped{ending}", f"offline{ending}"
+        if {one, other} <= set(ever):
+            steps, success = tables[one]
+            first = [int(steps[row.argmax()]) for row in success.T if row.any()]
+            claims.append(Claim(f"{one} DDPG solves the 2x2 maze more often than {other} DDPG",
+                                ever[one]["rate"] > ever[other]["rate"],
+                                {one: ever[one], other: ever[other],
+                                 "the intervals lie apart": ever[one]["wilson"][0] > ever[other]["wilson"][1],
+                                 "first solved, median of the steps": float(np.median(first)) if first else None},
+                                "[Matheron2020] 4.5"))
+            claims.append(Claim(f"what {one} DDPG has solved it keeps (at the last evaluation, of those ever solved)",
+                                last[one]["successes"] == ever[one]["successes"] if first else None,
+                                {"kept": rate(last[one]["successes"], ever[one]["successes"])}, "[Matheron2020] 4.6",
+                                "" if first else "none was solved"))
+    return claims
+
+
+def _little_of_the_wall(record: dict[str, Any], figures: Path) -> Claim:
+    _draw_mini_batch(record, figures)
+    count = record["explored"] * len(record["seeds"])
+    inside = rate(sum(record["stopped_inside"]), count)
+    return Claim("at most one in twenty of Ex's transitions tells of the inner wall of the 2x2 maze",
+                 inside["rate"] <= 0.05, {"stopped by the inner wall": inside,
+                                          "stopped by any wall": rate(sum(record["stopped"]), count)},
+                 "[Matheron2020] 4.7, Fig. 4.7", "what can be learnt from them all the same: see offline DDPG")
+
+
+def _draw_mini_batch(record: dict[str, Any], figures: Path) -> None:
+    model = make("pbcs/Maze-v0", {"size": record["size"]})
+    before, after = (np.array(states) for states in record["batch"])
+    figure, axes = new_figure(8.4, 4.4)
+    axes.remove()
+    left, right = figure.subplots(1, 2)
+    furnish(left, model)
+    for panel in (left, right):
+        panel.add_collection(LineCollection(np.stack([before, after], axis=1), color="C0", linewidth=1.2, zorder=3))
+        panel.plot(*after.T, ".", color="C0", markersize=3, zorder=3)
+        panel.set(xlim=left.get_xlim(), ylim=left.get_ylim(), aspect="equal")
+    figure.suptitle(f"{len(before)} of {record['explored']:,} transitions of Ex, with and without the maze (Fig. 4.7)",
+                    fontsize=10)
+    save(figure, figures / "mini-batch.png")
+
+
+def _draw(record: dict[str, Any], figures: Path) -> None:
+    model = make("pbcs/Maze-v0", {"size": record["size"], "wall_penalty": -1.0, "terminate_on_success": False})
+    for picture in record["pictures"]:
+        values, actions = np.array(picture["values"]), np.array(picture["actions"])
+        policy = _looked_up(actions, float(model.state_high[0]))
+        value = _looked_up(values[:, None], float(model.state_high[0]))
+        title = (f"{record['variant']}, seed {record['seeds'][0]}: {record['explored']:,} transitions of Ex,\n"
+                 f"{record['updates']:,} updates on them, {picture['steps']:,} steps (Fig. {record['figure']})")
+        figure = critic_figure(model, policy, lambda observations, _, value=value: value(observations)[:, 0],
+                               rollout=np.array(picture["rollout"]), title=title)
+        ending = "" if picture["steps"] == record["steps"] else f"-{picture['steps']}"
+        save(figure, figures / f"critic-{record['variant']}{ending}.png")
+
+
+def _looked_up(table: np.ndarray, extent: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Return a function of positions that looks them up in a table of a square grid, row by row."""
+    count = int(np.sqrt(len(table)))
+
+    def look_up(positions: np.ndarray) -> np.ndarray:
+        column, row = np.clip((positions / extent * count).astype(int), 0, count - 1).T
+        return table[row * count + column]
+
+    return look_up

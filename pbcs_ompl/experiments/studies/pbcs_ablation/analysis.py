@@ -1,0 +1,113 @@
+"""What alpha, beta and the radius change."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.study.paired import greater
+from pbcs_ompl.figures.by_group import rates_figure, values_figure
+from pbcs_ompl.figures.canvas import save
+
+Records = list[dict[str, Any]]
+SOURCE = "[Matheron2020] 7.5"
+NAMES = {"alpha": "alpha", "beta": "beta", "radius": "epsilon (radius)"}
+
+
+def analyse(records: Records, figures: Path) -> list[Claim]:
+    """Draw rates, transitions and skills for each value of each parameter; check what the thesis expects of them."""
+    for parameter in NAMES:
+        _draw(records, parameter, figures)
+    return [*_alpha(records), *_beta(records), *_radius(records)]
+
+
+def _swept(records: Records, parameter: str) -> dict[float, Records]:
+    """Return the runs for each value of a parameter whose other parameters have the usual values, in rising order."""
+    chosen = [r for r in records if all(r["point"][name] == value for name, value in r["usual"].items()
+                                        if name != parameter)]
+    values = sorted({record["point"][parameter] for record in chosen})
+    return {value: [record for record in chosen if record["point"][parameter] == value] for value in values}
+
+
+def _usual(records: Records, parameter: str) -> float:
+    return float(records[0]["usual"][parameter])
+
+
+def _ends(records: Records, parameter: str) -> tuple[float, float, float]:
+    """Return the lowest, the usual and the highest value."""
+    values = [*_swept(records, parameter)]
+    return values[0], _usual(records, parameter), values[-1]
+
+
+def _solved(runs: Records) -> dict[str, Any]:
+    return rate(sum(record["solved"] for record in runs), len(runs))
+
+
+def _more(claim: str, records: Records, key: str, parameter: str, values: tuple[float, float],
+          source: str = SOURCE) -> Claim:
+    """Claim that a number is larger with the first value than with the second, maze by maze and seed by seed.
+
+    The number of skills is that of complete chains only.
+    """
+    swept = _swept(records, parameter)
+    one, other = ({(r["size"], r["seed"]): float(r[key]) for r in swept[value] if key != "skills" or not r["stalled"]}
+                  for value in values)
+    return greater(claim, one, other, (f"{values[0]:g}", f"{values[1]:g}"), source)
+
+
+def _no_worse(claim: str, records: Records, parameter: str, value: float, than: float) -> Claim:
+    swept = _swept(records, parameter)
+    one, other = _solved(swept[value]), _solved(swept[than])
+    told = one["n"] and value != than
+    return Claim(f"{claim} (its rate lies in the other's interval, or above)",
+                 one["rate"] >= other["wilson"][0] if told else None, {f"{value:g}": one, f"{than:g}": other}, SOURCE)
+
+
+def _alpha(records: Records) -> list[Claim]:
+    low, usual, high = _ends(records, "alpha")
+    return [_more(f"alpha = {high:g} costs more transitions than {usual:g}", records, "train_transitions", "alpha",
+                  (high, usual)),
+            _no_worse(f"alpha = {high:g} builds chains as well as {usual:g}", records, "alpha", high, usual),
+            _more(f"alpha = {low:g} leads to more skills than {usual:g}", records, "skills", "alpha", (low, usual))]
+
+
+def _beta(records: Records) -> list[Claim]:
+    low, usual, high = _ends(records, "beta")
+    swept = _swept(records, "beta")
+    few, many = _solved(swept[low]), _solved(swept[usual])
+    return [_more(f"beta = {high:g} costs more transitions than {usual:g}", records, "train_transitions", "beta",
+                  (high, usual)),
+            _no_worse(f"beta = {high:g} builds chains as well as {usual:g}", records, "beta", high, usual),
+            Claim(f"beta = {low:g} leads to chains that fail more often than with {usual:g} (the intervals lie apart)",
+                  few["wilson"][1] < many["wilson"][0] if low != usual else None,
+                  {f"{low:g}": few, f"{usual:g}": many,
+                   **{f"success with random actions, median, {value:g}":
+                      float(np.median([record["success_rate"] for record in swept[value]])) for value in (low, usual)}},
+                  SOURCE)]
+
+
+def _radius(records: Records) -> list[Claim]:
+    low, usual, high = _ends(records, "radius")
+    ours = "ours; [Matheron2020] 7.5 only says what epsilon is"
+    return [_more(f"epsilon = {low:g} costs more transitions than {usual:g}", records, "train_transitions", "radius",
+                  (low, usual), ours),
+            _more(f"epsilon = {low:g} leads to more skills than {high:g}", records, "skills", "radius", (low, high),
+                  ours)]
+
+
+def _draw(records: Records, parameter: str, figures: Path) -> None:
+    sizes = sorted({record["size"] for record in records})
+    swept = _swept(records, parameter)
+    groups = {f"{size}x{size}": {f"{value:g}": [r for r in runs if r["size"] == size] for value, runs in swept.items()}
+              for size in sizes}
+    name = NAMES[parameter]
+    save(rates_figure({size: {value: (sum(r["solved"] for r in runs), len(runs)) for value, runs in values.items()}
+                       for size, values in groups.items()}, xlabel=name,
+                      title=f"Solved by PBCS without verification, usual {name} {_usual(records, parameter):g}"),
+         figures / f"{parameter}-solved.png")
+    for key, label in (("train_transitions", "training transitions"), ("skills", "skills")):
+        columns = {size: {value: [r[key] for r in runs] for value, runs in values.items()}
+                   for size, values in groups.items()}
+        save(values_figure(columns, xlabel=name, ylabel=label, log=key != "skills", title=f"{label.capitalize()}"),
+             figures / f"{parameter}-{key.replace('_', '-')}.png")

@@ -1,0 +1,98 @@
+"""Choose the adapter for an environment."""
+
+import warnings
+from typing import Any, cast
+
+import gymnasium
+
+from pbcs_ompl.core.contracts import ResetAnywhere, VectorisedEnv
+from pbcs_ompl.core.errors import InvalidOption, NoResetAnywhere
+from pbcs_ompl.resettable.adapters.classic import AttributeEnv, VectorEnv, keeps_state
+from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel, offers_get_set_state
+from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, MujocoModel, check_observes, shows_mujoco
+from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
+from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, check_replays, copies_are_faithful
+from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.resettable.spaces import check_actions, check_flattenable, check_observations
+from pbcs_ompl.resettable.wrappers import unwrap
+
+HOW_TO = (
+    "implement `get_env_state() -> array [D]` and `set_env_state(array)` beside `step` (simple), or the "
+    "protocol `pbcs_ompl.core.contracts.VectorisedEnv` (fast)"
+)
+MODEL_MEMBERS = {*ResetAnywhere.__annotations__, *(n for n in vars(ResetAnywhere) if not n.startswith("_"))}
+
+
+def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None) -> ResetAnywhere:
+    """Return `env` as a `ResetAnywhere`; a model that is already adapted is returned as it is.
+
+    The first that fits: its own `VectorisedEnv` protocol, its own `get_env_state` and `set_env_state`, MuJoCo,
+    classic control, deep copies if they prove faithful, and replayed actions, of whose slowness a warning tells.
+    The model works on `env.unwrapped` and moves it about: give it an environment of its own.
+
+    Args:
+        env: A `gymnasium.Env`.
+        goal: What a success is, in place of what the environment reports (see `rules.goal_rule`).
+        feature: What planners explore, in place of the adapter's choice (see `rules.feature_rule`).
+
+    Raises:
+        NoResetAnywhere: its states cannot be restored, or a wrapper would be lost; says what to implement.
+        UnsupportedSpace: its actions are no finite vector Box, or its observations no vector Box.
+        InvalidOption: a rule does not parse, or does not fit the environment.
+    """
+    if not isinstance(env, gymnasium.Env):
+        if goal is not None or feature is not None:
+            raise InvalidOption("a goal or feature can be given to a gymnasium.Env only, not to its adapted model")
+        return _as_model(env)
+    inner = unwrap(env)
+    if isinstance(inner, RestorableEnv):
+        return _model_of(inner)
+    check_actions(inner)
+    ruled = goal is not None or feature is not None
+    if isinstance(inner, VectorisedEnv) and not ruled:
+        check_observations(inner)
+        return VectorisedModel(inner)
+    if offers_get_set_state(inner) and not (shows_mujoco(inner) and not _is_vector(inner)):
+        check_observations(inner)
+        return GetSetStateModel(VectorEnv(inner, goal, feature) if ruled else inner)
+    check_flattenable(inner)
+    return _model_of(_restorable(inner, goal, feature))
+
+
+def _restorable(inner: Any, goal: Any, feature: Any) -> RestorableEnv:
+    if shows_mujoco(inner):
+        check_observes(inner)
+        return MujocoEnv(inner, goal, feature)
+    if keeps_state(inner):
+        return AttributeEnv(inner, goal, feature)
+    check_replays(inner)
+    if copies_are_faithful(inner):
+        return CopiedEnv(inner, goal, feature)
+    warnings.warn(f"{_name(inner)} is restored by replaying its actions, which is slow: {HOW_TO}", stacklevel=3)
+    return ReplayedEnv(inner, goal, feature)
+
+
+def _model_of(env: RestorableEnv) -> ResetAnywhere:
+    return MujocoModel(env) if isinstance(env, MujocoEnv) else GetSetStateModel(env)
+
+
+def _is_vector(env: Any) -> bool:
+    """Tell whether `get_env_state` returns numbers; Adroit's returns a dictionary, and lacks the warm start."""
+    env.reset(seed=0)
+    return not isinstance(env.get_env_state(), dict)
+
+
+def _as_model(model: Any) -> ResetAnywhere:
+    missing = sorted(name for name in MODEL_MEMBERS if not hasattr(model, name))
+    if isinstance(model, str):
+        raise NoResetAnywhere(f"expected a gymnasium.Env, got the string {model!r}; call make({model!r})")
+    if len(missing) == len(MODEL_MEMBERS):
+        raise NoResetAnywhere(f"expected a gymnasium.Env or a ResetAnywhere, got {type(model).__name__}")
+    if missing:
+        raise NoResetAnywhere(f"{type(model).__name__} is no ResetAnywhere; it lacks {', '.join(missing)}")
+    return cast(ResetAnywhere, model)
+
+
+def _name(env: gymnasium.Env) -> str:
+    return env.spec.id if env.spec is not None else type(env).__name__

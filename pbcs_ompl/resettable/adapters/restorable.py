@@ -1,0 +1,180 @@
+"""What every family's adapter makes of an environment: one with `get_env_state` and `set_env_state`."""
+
+import math
+from abc import ABC, abstractmethod
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box
+
+from pbcs_ompl.core.contracts import Array, Capability
+from pbcs_ompl.core.errors import CallbackFailed
+from pbcs_ompl.resettable.explore import feature_bounds
+from pbcs_ompl.resettable.rules import (
+    FeatureRule,
+    GoalRule,
+    Outcome,
+    feature_rule,
+    goal_rule,
+    reported_success,
+    rule_text,
+)
+
+UNBOUNDED = 1e9
+"""OMPL wants finite bounds. Dimensions that nobody samples get these."""
+EXPLORED_STEPS = 500
+
+
+class RestorableEnv(gymnasium.Env[Array, Array], ABC):
+    """A Gymnasium environment that can be restored; a family says how to save and load.
+
+    Its state is [feature F | what `save` returns | distance to the goal]. The feature comes first, so it is a
+    selection of state dimensions for OMPL, whatever computes it. The last number makes success a function of the
+    state: it is what the environment tells of its distance to the goal, else 0 in a success and 1 elsewhere.
+
+    Args:
+        inner: The environment without wrappers.
+        goal: What a success is; by default what the environment reports (see `rules.reported_success`).
+        feature: What planners explore; by default the family's choice.
+    """
+
+    capabilities: frozenset[Capability] = frozenset({"visited", "exact"})
+    perturb_by_rollouts = True
+    reach = 1.0
+    """A state is a success if its distance to the goal is smaller, where the environment tells one."""
+
+    def __init__(self, inner: Any, goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None):
+        self.inner = inner
+        self.goal_rule = None if goal is None else rule_text("goal", goal)
+        self.feature_rule = None if feature is None else rule_text("feature", feature)
+        self._is_success = reported_success if self.goal_rule is None else goal_rule(self.goal_rule)
+        self._feature_of = self.default_feature() if self.feature_rule is None else feature_rule(self.feature_rule)
+        self.spec = inner.spec
+        self.render_mode = inner.render_mode
+        self.action_space = inner.action_space
+        self._head, self._distance = np.empty(0), 1.0
+        self._tells_distance = False
+        observation, _ = self.reset(seed=0)
+        self.observation_space = Box(-np.inf, np.inf, observation.shape, np.float64)
+        self.goal_threshold = self.reach if self._tells_distance else 0.5
+        saved = len(self.save())
+        self.feature_dims = tuple(range(len(self._head)))
+        low, high, self.bounds_from = feature_bounds(self, EXPLORED_STEPS)
+        rest = np.full(saved + 1, UNBOUNDED)
+        self.state_low, self.state_high = np.concatenate([low, -rest]), np.concatenate([high, rest])
+        self.reset(seed=0)
+
+    @abstractmethod
+    def save(self) -> Array:
+        """Return everything needed to go on, as a vector of the same length at any time."""
+
+    @abstractmethod
+    def load(self, saved: Array) -> None:
+        """Go back to what `save` returned.
+
+        Raises:
+            InvalidState: the environment cannot go there.
+        """
+
+    @abstractmethod
+    def observation(self) -> Any:
+        """Return the observation in the present state."""
+
+    def default_feature(self) -> FeatureRule:
+        """Return what planners explore unless the user says otherwise."""
+        return feature_rule("obs")
+
+    def told_distance(self, outcome: Outcome) -> float | None:
+        """Return the distance to the goal after `outcome`; None where the environment does not tell."""
+        return None
+
+    def feature_box(self) -> tuple[Array, Array] | None:
+        """Return the bounds [F] of the feature; None where they have to be explored."""
+        return None
+
+    def difference(self, states: Array, others: Array) -> Array:
+        """Return the differences [B, K] between saved states [B, S] that `distance` measures, before features."""
+        return np.empty((len(states), 0))
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Reset the environment."""
+        observation, info = self.inner.reset(seed=seed, options=options)
+        self._remember(Outcome(self.inner, observation, math.nan, False, info))
+        return flat(observation), info
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Make one step of the environment."""
+        observation, reward, terminated, truncated, info = self.inner.step(action)
+        success = self._remember(Outcome(self.inner, observation, float(reward), bool(terminated), info))
+        return flat(observation), float(reward), bool(terminated), bool(truncated), {**info, "is_success": success}
+
+    def get_env_state(self) -> Array:
+        """Return the state [D]."""
+        return np.concatenate([self._head, self.save(), [self._distance]])
+
+    def set_env_state(self, state: Array) -> None:
+        """Go back to a state [D].
+
+        Raises:
+            InvalidState: the environment cannot go there.
+        """
+        features = len(self.feature_dims)
+        self._head, self._distance = np.array(state[:features]), float(state[-1])
+        self.load(np.array(state[features:-1], dtype=np.float64))
+
+    def observe(self, states: Array) -> Array:
+        """Return the observations [B, O] of states [B, D]."""
+        rows = np.empty((len(states), *self.observation_space.shape))  # type: ignore[misc]
+        for row, state in zip(rows, states, strict=True):
+            self.set_env_state(state)
+            row[:] = flat(self.observation())
+        return rows
+
+    def goal_distance(self, states: Array) -> Array:
+        """Return the distances to the goal [B], as they were told when the states were reached."""
+        return np.array(states, dtype=np.float64)[:, -1]
+
+    def distance(self, states: Array, others: Array) -> Array:
+        """Return the lengths [B] of the differences between states, for activation sets.
+
+        Where a family knows no difference of its own, those of the features, in units in which the extent of each is 2,
+        as in the smallest maze: positions and speeds then weigh alike.
+        """
+        states, others = np.asarray(states), np.broadcast_to(others, np.shape(states))
+        features = len(self.feature_dims)
+        saved = self.difference(states[:, features:-1], others[:, features:-1])
+        if saved.shape[1] == 0:
+            extent = self.state_high[:features] - self.state_low[:features]
+            saved = (states[:, :features] - others[:, :features]) * (2.0 / extent)
+        return np.linalg.norm(saved, axis=1)
+
+    def render(self) -> Any:
+        """Render the environment."""
+        return self.inner.render()
+
+    def close(self) -> None:
+        """Close the environment."""
+        self.inner.close()
+
+    def _remember(self, outcome: Outcome) -> bool:
+        """Keep feature and distance of what was reached; return whether it is a success."""
+        self._head = np.asarray(self._feature_of(outcome), dtype=np.float64).reshape(-1)
+        if not len(self._head):
+            raise CallbackFailed("the feature function returned no numbers")
+        success = bool(self._is_success(outcome))
+        told = None if self.goal_rule is not None else self.told_distance(outcome)
+        self._tells_distance = told is not None
+        if told is None:
+            self._distance = 0.0 if success else 1.0
+        else:
+            below = np.nextafter(self.reach, 0.0)
+            self._distance = min(told, below) if success else max(told, self.reach)
+        return success
+
+
+def flat(observation: Any) -> Array:
+    """Return an observation as one vector; the entries of a dictionary in the order of their names."""
+    if isinstance(observation, dict):
+        return np.concatenate([flat(observation[key]) for key in sorted(observation)])
+    return np.array(observation, dtype=np.float64).ravel()

@@ -1,0 +1,44 @@
+"""The adapter for environments that are functions of batches of states already: nothing is put in between."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl.core.contracts import Array, BoolArray, Capability, Transition
+from pbcs_ompl.resettable.model import Model
+
+
+class VectorisedModel(Model):
+    """A `VectorisedEnv` as a `ResetAnywhere`: its own methods, bound directly, beside `Model`'s.
+
+    `step_one` is the environment's, if it has one: then nothing is checked in it, and NaN gives NaN.
+    """
+
+    capabilities: frozenset[Capability] = frozenset({"visited", "arbitrary", "exact"})
+
+    def __init__(self, env: Any):
+        super().__init__(env, env.state_low, env.state_high)
+        self.goal_threshold = float(env.goal_threshold)
+        self.transition: Callable[[Array, Array], Transition] = env.transition
+        self.observe: Callable[[Array], Array] = env.observe
+        self.goal_distance: Callable[[Array], Array] = env.goal_distance
+        self.step_one: Callable[[list[float], list[float]], list[float]] = getattr(
+            env, "step_one", self._step_one_by_transition)
+
+    def initial_state(self, seed: int | None = None) -> Array:
+        """Return the state [D] after `env.reset(seed=seed)`."""
+        self.env.reset(seed=seed)
+        return np.array(self.env.get_env_state(), dtype=np.float64)
+
+    def is_valid(self, states: Array) -> BoolArray:
+        """Return which states [B, D] the environment can be in [B]."""
+        return self.env.is_valid(states)
+
+    def compiled_step(self) -> Any:
+        """Return what the environment offers to compiled planners: its `compiled_step()`, or None."""
+        offer = getattr(self.env, "compiled_step", None)
+        return None if offer is None else offer()
+
+    def _step_one_by_transition(self, state: list[float], control: list[float]) -> list[float]:
+        return self.transition(np.array([state]), np.array([control])).states[0].tolist()

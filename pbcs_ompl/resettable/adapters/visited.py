@@ -1,0 +1,177 @@
+"""Adapters for environments that can only go back to where they were: copies, and replayed actions.
+
+The saved state is a single number, which names a way from `reset(seed)`. The seed itself names the start, and a hash
+of the name before and of the action names what follows. So the same actions give the same numbers in every process,
+and a trajectory found here can be replayed elsewhere.
+"""
+
+import struct
+from abc import abstractmethod
+from copy import deepcopy
+from hashlib import blake2b
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.errors import InvalidState, NoResetAnywhere
+from pbcs_ompl.resettable.adapters.restorable import RestorableEnv, flat
+
+FIRST_HASH = float(2**32)
+"""Smaller numbers are seeds."""
+PROOF_STEPS = 20
+
+
+class VisitedEnv(RestorableEnv):
+    """Names what was visited and finds it again; a subclass says how."""
+
+    def __init__(self, inner: Any, goal: Any = None, feature: Any = None):
+        self._name = 0.0
+        self._observations: dict[float, Array] = {}
+        super().__init__(inner, goal, feature)
+
+    def save(self) -> Array:
+        """Return the name [1] of the present state."""
+        return np.array([self._name])
+
+    def load(self, saved: Array) -> None:
+        """Go back to the state of a name [1]; a start that was not visited yet is one reset away."""
+        name = float(saved[0])
+        if name not in self._observations:
+            if not 0 <= name < FIRST_HASH or name != int(name):
+                raise InvalidState(f"{self._id()} can only go back to states it has visited, and {name} is none")
+            head, distance = self._head, self._distance
+            self.reset(seed=int(name))
+            self._head, self._distance = head, distance
+            return
+        self.recall(name)
+        self._name = name
+
+    def observation(self) -> Any:
+        """Return the observation that was made when the present state was visited."""
+        return self._observations[self._name]
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        """Reset with a seed, a random one if need be, so that the start can be found again."""
+        seed = int(np.random.default_rng().integers(2**32)) if seed is None else seed
+        observation, info = super().reset(seed=seed, options=options)
+        self._name = float(seed)
+        self._observations[self._name] = flat(observation)
+        self.keep(self._name, None, None)
+        return observation, info
+
+    def step(self, action: Array) -> Any:
+        """Make one step, and name where it leads."""
+        before = self._name
+        outcome = super().step(action)
+        self._name = following(before, action)
+        self._observations[self._name] = flat(outcome[0])
+        self.keep(self._name, before, action)
+        return outcome
+
+    @abstractmethod
+    def keep(self, name: float, before: float | None, action: Array | None) -> None:
+        """Make sure that the present state can be found again by its name."""
+
+    @abstractmethod
+    def recall(self, name: float) -> None:
+        """Go back to the state of a name."""
+
+    def _id(self) -> str:
+        return type(self.inner).__name__
+
+
+class CopiedEnv(VisitedEnv):
+    """Keeps a deep copy of the environment for every state: only after `copies_are_faithful` has proved them."""
+
+    def __init__(self, inner: Any, goal: Any = None, feature: Any = None):
+        self._copies: dict[float, Any] = {}
+        super().__init__(inner, goal, feature)
+
+    def keep(self, name: float, before: float | None, action: Array | None) -> None:
+        """Copy the environment."""
+        if name not in self._copies:
+            self._copies[name] = deepcopy(self.inner)
+
+    def recall(self, name: float) -> None:
+        """Go on with a copy of the copy."""
+        self.inner = deepcopy(self._copies[name])
+
+
+class ReplayedEnv(VisitedEnv):
+    """Goes back by `reset(seed)` and the actions since: slow, O(depth), and right wherever steps are deterministic.
+
+    Source: [Matheron2020] 1.3.
+    """
+
+    def __init__(self, inner: Any, goal: Any = None, feature: Any = None):
+        self._ways: dict[float, tuple[float, Array] | None] = {}
+        super().__init__(inner, goal, feature)
+
+    def keep(self, name: float, before: float | None, action: Array | None) -> None:
+        """Remember the way."""
+        self._ways[name] = None if before is None or action is None else (before, np.array(action))
+
+    def recall(self, name: float) -> None:
+        """Go the way again."""
+        actions = []
+        while (way := self._ways[name]) is not None:
+            name, action = way
+            actions.append(action)
+        self.inner.reset(seed=int(name))
+        for action in reversed(actions):
+            self.inner.step(action)
+
+
+def following(name: float, action: Array) -> float:
+    """Return the name of what follows a state under an action: a hash of both in [2**32, 2**53)."""
+    digest = blake2b(struct.pack("<d", name) + np.ascontiguousarray(action).tobytes(), digest_size=8).digest()
+    return FIRST_HASH + float(int.from_bytes(digest, "little") % (2**53 - 2**32))
+
+
+def copies_are_faithful(env: Any) -> bool:
+    """Try whether a deep copy in the midst of an episode continues as the original does."""
+    rng = np.random.default_rng(0)
+    env.reset(seed=0)
+    for _ in range(PROOF_STEPS):
+        if env.step(_action(env, rng))[2]:
+            break
+    actions = [_action(env, rng) for _ in range(PROOF_STEPS)]
+    try:
+        copy, spare = deepcopy(env), deepcopy(env)
+        theirs = _walk(copy, actions)
+        return _walk(env, actions) == theirs and _walk(spare, actions) == theirs
+    except Exception:  # whatever a foreign class raises when it is copied: the proof has failed
+        return False
+
+
+def check_replays(env: Any) -> None:
+    """Refuse an environment in which the same actions from the same seed lead elsewhere.
+
+    Raises:
+        NoResetAnywhere: its steps are random.
+    """
+    rng = np.random.default_rng(0)
+    actions = [_action(env, rng) for _ in range(2 * PROOF_STEPS)]
+    walks = []
+    for seed in (0, 1, 0):
+        env.reset(seed=seed)
+        walks.append(_walk(env, actions))
+    if walks[0] != walks[2]:
+        raise NoResetAnywhere(f"{type(env).__name__} cannot be reset anywhere: the same actions from the same seed "
+                              f"lead elsewhere, so its steps are random; make the randomness part of its state")
+
+
+def _action(env: Any, rng: np.random.Generator) -> Array:
+    return rng.uniform(env.action_space.low, env.action_space.high).astype(env.action_space.dtype)
+
+
+def _walk(env: Any, actions: list[Array]) -> list[bytes]:
+    """Return what `env` says to each action, as bytes."""
+    told = []
+    for action in actions:
+        observation, reward, terminated, _, _ = env.step(action)
+        told.append(flat(observation).tobytes() + struct.pack("<d?", float(reward), bool(terminated)))
+        if terminated:
+            break
+    return told

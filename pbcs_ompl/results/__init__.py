@@ -1,0 +1,1 @@
+"""Result folders: files, locks, provenance, and the report."""

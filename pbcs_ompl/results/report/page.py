@@ -1,0 +1,76 @@
+"""A report as one HTML page that needs no other file, no network and no script."""
+
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from pbcs_ompl.core.errors import DamagedFile, RunFolderError
+from pbcs_ompl.core.formatting import in_words, short
+from pbcs_ompl.results.folder import write_atomically
+from pbcs_ompl.results.report.folder import find_folders
+from pbcs_ompl.results.report.section import Section, damaged_section, make_section
+
+REPORT = "report.html"
+GENERATOR = '<meta name="generator" content="pbcs report">'
+"""Marks a page of ours, which a new one may replace."""
+HEAD_BYTES = 1024
+
+
+def write_report(folder: str | Path, out: str | Path | None = None) -> tuple[Path, list[Section]]:
+    """Write what a result folder holds, or all result folders below one, as one HTML page.
+
+    Args:
+        folder: A result folder, or one that holds many.
+        out: The page; report.html in `folder` by default. A report that is there already is replaced.
+
+    Returns:
+        The page's path, and what it shows of each folder.
+
+    Raises:
+        RunFolderError: no results in `folder`; or `out` is a file of somebody else, or cannot be written.
+        DamagedFile: `folder` is a result folder with a damaged file. One among many is reported on the page.
+    """
+    root = Path(folder)
+    paths = find_folders(root)
+    page = root / REPORT if out is None else Path(out)
+    _check_replaceable(page)
+    sections = [make_section(root, root)] if paths == [root] else [_section(path, root) for path in paths]
+    stream = _template().generate(
+        sections=sections, single=paths == [root], root=str(root), generator=GENERATOR, version=version("pbcs-ompl"),
+        now=datetime.now().astimezone().isoformat(sep=" ", timespec="minutes"))
+    write_atomically(page, lambda file: file.writelines(part.encode() for part in stream))
+    return page, sections
+
+
+def _section(path: Path, root: Path) -> Section:
+    try:
+        return make_section(path, root)
+    except DamagedFile as error:
+        return damaged_section(path, root, error)
+
+
+def _check_replaceable(page: Path) -> None:
+    if page.is_dir():
+        raise RunFolderError(f"cannot write {page}: it is a folder; name a file")
+    if page.exists() and GENERATOR.encode() not in _head(page):
+        raise RunFolderError(f"{page} was not written by pbcs report; choose another --out, or remove it first")
+
+
+def _head(page: Path) -> bytes:
+    with open(page, "rb") as file:
+        return file.read(HEAD_BYTES)
+
+
+def _template() -> Any:
+    environment = Environment(loader=PackageLoader("pbcs_ompl.results.report"), autoescape=True,
+                              undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"cell": _cell, "in_words": in_words}
+    return environment.get_template("report.html")
+
+
+def _cell(value: Any) -> str:
+    """Write a value of a table."""
+    return {None: "–", True: "yes", False: "no"}[value] if value is None or isinstance(value, bool) else short(value)

@@ -1,0 +1,110 @@
+"""One result folder as a section of a report."""
+
+import base64
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from struct import Struct
+
+from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.results.folder import CONFIG
+from pbcs_ompl.results.report.comparison import comparison_content
+from pbcs_ompl.results.report.content import Content, Table
+from pbcs_ompl.results.report.folder import Folder, read_folder
+from pbcs_ompl.results.report.repeat import going_on, repeating
+from pbcs_ompl.results.report.single import evaluation_content, plan_content, training_content
+from pbcs_ompl.results.report.study import study_content
+
+CONTENTS: dict[str, Callable[[Folder], Content]] = {
+    "plan": plan_content, "training": training_content, "evaluation": evaluation_content,
+    "comparison": comparison_content, "study": study_content}
+PNG = b"\x89PNG\r\n\x1a\n"
+HEAD = Struct(">8s8xII")
+"""The first bytes of a PNG: its signature, the length and name of its first chunk, the width and the height."""
+DAMAGED = "damaged"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture in a result folder, and its size in pixels."""
+
+    path: Path
+    width: int
+    height: int
+
+    @property
+    def data_uri(self) -> str:
+        """The picture itself, as an address that needs no other file."""
+        return "data:image/png;base64," + base64.b64encode(self.path.read_bytes()).decode()
+
+
+def read_figure(path: Path) -> Figure:
+    """Return the picture in a file.
+
+    Raises:
+        DamagedFile: it is no PNG.
+    """
+    with open(path, "rb") as file:
+        head = file.read(HEAD.size)
+    if len(head) < HEAD.size or HEAD.unpack(head)[0] != PNG:
+        raise DamagedFile(f"{path} is damaged: not a PNG")
+    return Figure(path, *HEAD.unpack(head)[1:])
+
+
+@dataclass(frozen=True)
+class Section:
+    """What a report shows of one folder.
+
+    Attributes:
+        name: The folder, as seen from that of the report.
+        kind: What it holds, `DAMAGED` where nobody can tell.
+        content: What came out.
+        figures: Its pictures.
+        settings: Its config.toml.
+        versions: What worked there.
+        repeat, go_on: Commands; "" where there is none.
+    """
+
+    name: str
+    kind: str
+    content: Content
+    figures: list[Figure]
+    settings: str
+    versions: Table
+    repeat: str
+    go_on: str
+
+
+def make_section(path: Path, root: Path) -> Section:
+    """Read a result folder below `root`.
+
+    Raises:
+        DamagedFile: a file in it is damaged.
+    """
+    folder = read_folder(path)
+    try:
+        content, repeat, go_on = CONTENTS[folder.kind](folder), repeating(folder), going_on(folder)
+    except (KeyError, TypeError) as error:
+        raise DamagedFile(f"{path} is not the folder of a {folder.kind} as this version writes it: "
+                          f"{error!r}") from error
+    pictures = [*path.glob("*.png"), *path.glob("figures/*.png")]
+    return Section(_name(path, root), folder.kind, content, [read_figure(picture) for picture in sorted(pictures)],
+                   (path / CONFIG).read_text(), _versions(folder.provenance), repeat, go_on)
+
+
+def damaged_section(path: Path, root: Path, error: DamagedFile) -> Section:
+    """Return the section of a folder that cannot be read, among others that can."""
+    content = Content("A folder that cannot be read", DAMAGED, False, [], failures=[(DAMAGED, str(error))])
+    return Section(_name(path, root), DAMAGED, content, [], "", _versions([]), "", "")
+
+
+def _name(path: Path, root: Path) -> str:
+    return str(path if path == root else path.relative_to(root))
+
+
+def _versions(provenance: list[dict[str, str]]) -> Table:
+    """Return one column for each process that worked in a folder."""
+    columns = ["", *(f"went on {number}" if number else "begun" for number in range(len(provenance)))]
+    keys = list(dict.fromkeys(key for one in provenance for key in one))
+    rows = [[key, *(one.get(key) for one in provenance)] for key in keys]
+    return Table("Versions and machine", columns if len(provenance) > 1 else [], rows, folded=True)

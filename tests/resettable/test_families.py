@@ -1,0 +1,184 @@
+"""One adapter for each family of environments: what is restored continues bit for bit."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from pbcs_ompl.bridge.plan import plan
+from pbcs_ompl.core.errors import InvalidState, NoResetAnywhere
+from pbcs_ompl.resettable import adapt, check_resettable, make
+from pbcs_ompl.resettable.adapters.classic import AttributeEnv
+from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel
+from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, following
+
+
+class Slider(gymnasium.Env):
+    """A point on a line with hidden parts of its state, and no way to set them."""
+
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float64)
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float64)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        super().reset(seed=seed)
+        self.hidden = {"place": float(self.np_random.uniform(-0.1, 0.1)), "speed": 0.0}
+        return np.array([self.hidden["place"]]), {}
+
+    def step(self, action: Any) -> Any:
+        self.hidden["speed"] = 0.9 * self.hidden["speed"] + 0.02 * float(action[0])
+        self.hidden["place"] += self.hidden["speed"]
+        done = abs(self.hidden["place"]) > 0.8
+        return np.array([self.hidden["place"]]), float(done), done, False, {}
+
+
+class Uncopyable(Slider):
+    def __deepcopy__(self, memo: Any) -> Any:
+        raise TypeError("cannot pickle a simulator")
+
+
+class ForgetfulCopy(Slider):
+    """As gymnasium.utils.EzPickle: the copy is a new environment."""
+
+    def __deepcopy__(self, memo: Any) -> Any:
+        copy = type(self)()
+        copy.reset(seed=0)
+        return copy
+
+
+class Dice(Slider):
+    def step(self, action: Any) -> Any:
+        return super().step(action + np.random.default_rng().normal(size=1))
+
+
+@pytest.mark.parametrize("env_id", ["Pendulum-v1", "MountainCarContinuous-v0"])
+def test_classic_control(env_id: str) -> None:
+    model: Any = make(env_id)
+    assert isinstance(model.env, AttributeEnv)
+    report = check_resettable(model)
+    assert report.ok, str(report)
+
+
+def test_steps_are_those_of_the_environment_itself() -> None:
+    model: Any = make("MountainCarContinuous-v0")
+    raw = gymnasium.make("MountainCarContinuous-v0").unwrapped
+    raw.reset(seed=4)
+    state = model.initial_state(4)
+    for _ in range(50):
+        action = raw.action_space.sample()
+        observation, reward, *_ = raw.step(action)
+        outcome = model.transition(state[None], action[None].astype(float))
+        state = outcome.states[0]
+        np.testing.assert_array_equal(model.observe(outcome.states)[0], observation)
+        assert outcome.rewards[0] == reward
+
+
+def test_bounds_are_those_of_the_observation_space_where_it_is_the_feature() -> None:
+    model: Any = make("MountainCarContinuous-v0")
+    assert model.env.bounds_from == "the observation space"
+    np.testing.assert_allclose(model.feature_high, [0.6, 0.07])
+    pendulum: Any = make("Pendulum-v1")
+    assert "random steps" in pendulum.env.bounds_from
+    assert (pendulum.feature_low < pendulum.initial_state()[:2]).all()
+
+
+@pytest.mark.parametrize("planner", ["Ex", "RRT", "KPIECE1"])
+def test_mountain_car_is_solved_and_replayed(planner: str) -> None:
+    result = plan("MountainCarContinuous-v0", planner, seed=0, max_transitions=100_000)
+    assert result.solved
+    assert result.replay_ok
+
+
+def test_a_state_that_says_nonsense_is_refused() -> None:
+    model = make("Pendulum-v1")
+    state = model.initial_state(0)
+    state[-2] = 3.0
+    with pytest.raises(InvalidState, match="expected 4 or 8"):
+        model.transition(state[None], np.zeros((1, 1)))
+
+
+def test_copies_serve_where_nothing_else_does() -> None:
+    model: Any = adapt(Slider())
+    assert isinstance(model.env, CopiedEnv)
+    assert model.capabilities == {"visited", "exact"}
+    report = check_resettable(model)
+    assert report.ok, str(report)
+
+
+@pytest.mark.parametrize("kind", [Uncopyable, ForgetfulCopy])
+def test_actions_are_replayed_where_copies_are_not_faithful(kind: type[Slider]) -> None:
+    with pytest.warns(UserWarning, match="replaying its actions, which is slow"):
+        model: Any = adapt(kind())
+    assert isinstance(model.env, ReplayedEnv)
+    start = model.initial_state(5)
+    controls = np.linspace(-1, 1, 10)[:, None]
+    states = [start]
+    for control in controls:
+        states.append(model.transition(states[-1][None], control[None]).states[0])
+    again = model.transition(np.array(states[:-1]), controls)
+    np.testing.assert_array_equal(again.states, states[1:])
+
+
+def test_random_steps_are_refused() -> None:
+    with pytest.raises(NoResetAnywhere, match="steps are random"):
+        adapt(Dice())
+
+
+def test_only_visited_states_can_be_restored() -> None:
+    model = adapt(Slider())
+    state = model.initial_state(0)
+    state[1] = 2.0**40 + 0.5
+    with pytest.raises(InvalidState, match="visited"):
+        model.transition(state[None], np.zeros((1, 1)))
+
+
+def test_a_start_is_known_by_its_seed() -> None:
+    state = adapt(Slider()).initial_state(7)
+    other = adapt(Slider())
+    np.testing.assert_array_equal(other.transition(state[None], np.ones((1, 1))).states,
+                                  adapt(Slider()).transition(state[None], np.ones((1, 1))).states)
+
+
+@pytest.mark.parametrize("planner", ["Ex", "RRT", "KPIECE1", "RandomWalk"])
+def test_every_planner_works_on_visited_states(planner: str) -> None:
+    result = plan(Slider(), planner, seed=1, max_transitions=5000)
+    assert result.solved
+    assert result.replay_ok
+
+
+def test_names_are_exact_numbers() -> None:
+    name = 3.0
+    names = {name}
+    for _ in range(1000):
+        name = following(name, np.array([0.25]))
+        assert name == int(name)
+        assert 2**32 <= name < 2**53
+        names.add(name)
+    assert len(names) == 1001
+
+
+def test_perturbed_states_are_reached_by_the_simulator() -> None:
+    model = make("Pendulum-v1")
+    state = model.initial_state(0)
+    drawn = model.perturb(state, 0.5, 20, np.random.default_rng(0))
+    assert drawn.shape == (20, len(state))
+    assert (model.distance(drawn, state) <= 0.5).all()
+    assert len(np.unique(drawn[:, 0])) > 2
+    with pytest.raises(InvalidState, match="larger"):
+        model.perturb(state, -0.0, 20, _Stepping())  # type: ignore[arg-type]
+
+
+class _Stepping(np.random.Generator):
+    """Random numbers that always ask for steps."""
+
+    def __init__(self) -> None:
+        super().__init__(np.random.PCG64(0))
+
+    def integers(self, low: int, high: int, size: int) -> Any:  # type: ignore[override]
+        return np.full(size, high - 1)
+
+
+def test_a_model_without_rules_has_plain_options() -> None:
+    model = make("Pendulum-v1")
+    assert model.env_kwargs == {}
+    assert isinstance(model, GetSetStateModel)

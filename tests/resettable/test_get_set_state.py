@@ -1,0 +1,188 @@
+"""Environments with get_env_state, set_env_state and a step, and the faults that the check finds in them."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from pbcs_ompl.core.errors import InvalidOption, InvalidState, NoResetAnywhere
+from pbcs_ompl.resettable import adapt, check_resettable
+
+
+class Cart(gymnasium.Env):
+    """Position and speed on a line; the observation is the position only."""
+
+    action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
+    observation_space = gymnasium.spaces.Box(-10.0, 10.0, (1,), np.float64)
+    state_low, state_high = np.array([-5.0, -1.0]), np.array([5.0, 1.0])
+    feature_dims = (0,)
+
+    def __init__(self) -> None:
+        self.state = np.zeros(2)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        super().reset(seed=seed)
+        self.state = np.zeros(2)
+        return self.state[:1].copy(), {}
+
+    def step(self, action: Any) -> Any:
+        speed = float(np.clip(self.state[1] + 0.1 * float(action[0]), -1.0, 1.0))
+        self.state = np.array([np.clip(self.state[0] + 0.1 * speed, -5.0, 5.0), speed])
+        done = bool(self.state[0] > 0.02)
+        return self.state[:1].copy(), float(done), done, False, {"is_success": done}
+
+    def get_env_state(self) -> np.ndarray:
+        return self.state.copy()
+
+    def set_env_state(self, state: np.ndarray) -> None:
+        self.state = np.array(state)
+
+    def observe(self, states: np.ndarray) -> np.ndarray:
+        return np.array(states)[:, :1]
+
+
+def test_a_cart_is_a_model() -> None:
+    model = adapt(Cart())
+    assert model.capabilities == {"visited", "arbitrary", "exact"}
+    assert model.env_id == "Cart"
+    assert model.feature_dims == (0,)
+    np.testing.assert_array_equal(model.bin_size, [0.5])
+    states = np.array([[0.0, 0.5], [-1.0, 0.0]])
+    result = model.transition(states, np.array([[1.0], [-1.0]]))
+    np.testing.assert_allclose(result.states, [[0.06, 0.6], [-1.01, -0.1]])
+    np.testing.assert_array_equal(result.success, [True, False])
+    assert model.step_one([0.0, 0.5], [1.0]) == result.states[0].tolist()
+    np.testing.assert_array_equal(model.is_valid(np.array([[0.0, 0.0], [9.0, 0.0], [np.nan, 0.0]])),
+                                  [True, False, False])
+
+
+def test_success_is_remembered_where_there_is_no_distance() -> None:
+    model = adapt(Cart())
+    states = np.array([[0.0, 0.5], [0.0, -0.5]])
+    after = model.transition(states, np.ones((2, 1))).states
+    np.testing.assert_array_equal(model.goal_distance(after) < model.goal_threshold, [True, False])
+    assert model.goal_distance(states).tolist() == [1.0, 1.0]
+
+
+def test_a_cart_passes_the_check() -> None:
+    report = check_resettable(Cart())
+    assert report.ok, str(report)
+    assert "can be reset anywhere" in str(report)
+
+
+def test_a_distance_to_the_goal_is_used() -> None:
+    class WithGoal(Cart):
+        goal_threshold = 0.25
+
+        def goal_distance(self, states: np.ndarray) -> np.ndarray:
+            return np.abs(states[:, 0] - 1.0)
+
+    result = adapt(WithGoal()).transition(np.array([[0.8, 0.0], [0.5, 0.0]]), np.zeros((2, 1)))
+    np.testing.assert_array_equal(result.success, [True, False])
+
+
+def test_the_observation_serves_as_state_and_gives_the_bounds() -> None:
+    class Plain(Cart):
+        observation_space = gymnasium.spaces.Box(-5.0, 5.0, (2,), np.float64)
+        state_low = state_high = property()  # type: ignore[assignment]
+
+        def reset(self, **kwargs: Any) -> Any:
+            super().reset(**kwargs)
+            return self.state.copy(), {}
+
+        def step(self, action: Any) -> Any:
+            return self.state.copy(), *super().step(action)[1:]
+
+    class Unobserved(Plain):
+        observe = property()  # type: ignore[assignment]
+
+    model = adapt(Unobserved())
+    assert model.capabilities == {"visited", "exact"}
+    np.testing.assert_array_equal(model.state_high, [5.0, 5.0])
+    np.testing.assert_array_equal(model.observe(np.array([[1.0, 2.0]])), [[1.0, 2.0]])
+
+
+@pytest.mark.parametrize(("members", "complaint"), [
+    ({"get_env_state": lambda self: {"qpos": self.state}}, "returned a dict; expected a vector"),
+    ({"observe": None}, "observe"),
+    ({"state_low": np.array([-np.inf, 0.0])}, "finite vectors"),
+    ({"state_low": np.zeros(3), "state_high": np.ones(3)}, "state_low has 3 dimensions"),
+    ({"feature_dims": (5,)}, "feature_dims"),
+    ({"goal_distance": lambda self, states: states[:, 0]}, "no `goal_threshold`"),
+])
+def test_incomplete_environments(members: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(NoResetAnywhere, match=complaint):
+        adapt(type("Incomplete", (Cart,), members)())
+
+
+def test_bad_batches() -> None:
+    model = adapt(Cart())
+    with pytest.raises(InvalidState, match=r"\[B, 2\]"):
+        model.transition(np.zeros((1, 3)), np.zeros((1, 1)))
+    with pytest.raises(InvalidOption, match="not finite"):
+        model.transition(np.zeros((1, 2)), np.full((1, 1), np.nan))
+    with pytest.raises(InvalidOption, match="cannot be steered"):
+        model.advance_towards(np.zeros((1, 2)), np.zeros((1, 1)))
+
+
+class Forgetful(Cart):
+    """Does not restore its speed."""
+
+    def set_env_state(self, state: np.ndarray) -> None:
+        self.state = np.array([state[0], self.state[1]])
+
+
+class Aliased(Cart):
+    """Hands out its own array, and changes it in place."""
+
+    def get_env_state(self) -> np.ndarray:
+        return self.state
+
+    def set_env_state(self, state: np.ndarray) -> None:
+        self.state = state
+
+
+class Noisy(Cart):
+    """Has a random step."""
+
+    def step(self, action: Any) -> Any:
+        self.state[1] += 0.01 * np.random.default_rng().normal()
+        return super().step(action)
+
+
+class Raising(Cart):
+    """Fails in the middle."""
+
+    def step(self, action: Any) -> Any:
+        raise ZeroDivisionError("oh no")
+
+
+class Hidden(Cart):
+    """Keeps a part of the state to itself."""
+
+    ticks = 0
+
+    def step(self, action: Any) -> Any:
+        self.ticks += 1
+        return super().step(np.asarray(action) * np.cos(self.ticks))
+
+
+@pytest.mark.parametrize(("fault", "failing"), [
+    (Forgetful, "come back as set"),
+    (Aliased, "returned arrays are copies"),
+    (Noisy, "continues as before"),
+    (Raising, "can be stepped: ZeroDivisionError: oh no"),
+    (Hidden, "continues as before"),
+])
+def test_faults_are_described_and_never_raised(fault: type[Cart], failing: str) -> None:
+    report = check_resettable(fault())
+    assert not report.ok
+    assert any(failing in str(check) and not check.ok for check in report.checks), str(report)
+    assert "FAIL" in str(report)
+
+
+def test_an_environment_that_cannot_be_adapted_gets_a_report_too() -> None:
+    report = check_resettable(gymnasium.make("CartPole-v1"))
+    assert not report.ok
+    assert "expected a Box" in str(report)

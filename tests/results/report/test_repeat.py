@@ -1,0 +1,133 @@
+"""The command that a report prints repeats the run: parsed, it has the settings of the folder's config.toml."""
+
+import shlex
+from argparse import Namespace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pbcs_ompl.cli import compare, eval, main, plan, study, train
+from pbcs_ompl.cli.arguments import build_parser, parse
+from pbcs_ompl.experiments.compare.sweep import make_sweep
+from pbcs_ompl.results.command_words import environment_words
+from pbcs_ompl.results.folder import read_toml, to_toml
+from pbcs_ompl.results.report.folder import Folder, read_folder
+from pbcs_ompl.results.report.repeat import going_on, repeating
+from pbcs_ompl.skills.config import TrainConfig
+
+
+class Caught(Exception):
+    """The verb has called the library."""
+
+
+@pytest.fixture
+def call(laboratory, monkeypatch):
+    """Run a command line up to the library's function; return what that was called with."""
+    monkeypatch.chdir(laboratory)
+
+    def catch(*arguments, **options):
+        raise Caught(arguments, options)
+
+    for module, name in ((plan, "plan"), (train, "train"), (eval, "evaluate"), (compare, "compare"),
+                         (study, "run_study")):
+        monkeypatch.setattr(module, name, catch)
+
+    def run(line):
+        assert line.startswith("pbcs ")
+        with pytest.raises(Caught) as caught:
+            main(shlex.split(line)[1:])
+        return caught.value.args
+
+    return run
+
+
+def settings(folder):
+    return {key: value for key, value in read_toml(folder / "config.toml").items() if key != "versions"}
+
+
+def test_a_plan(laboratory, call):
+    folder = Path("runs/plan")
+    (model, planner), options = call(repeating(read_folder(folder)))
+    again = {"env": model.env_id, "env_kwargs": model.env_kwargs, "planner": planner}
+    assert again | {name: options[name] for name in options.keys() - {"out", "on_progress"}} == settings(folder)
+    assert settings(folder)["env_kwargs"]["--goal"] == "reward>0"
+
+
+@pytest.mark.parametrize("name", ["training", "given"])
+def test_a_training(laboratory, call, name):
+    folder = Path("runs") / name
+    (env,), options = call(repeating(read_folder(folder)))
+    trajectory = options.pop("trajectory")
+    config = TrainConfig(**{key: value for key, value in options.items()
+                            if key in TrainConfig.__dataclass_fields__})
+    assert vars(config) | {"env": env, "env_kwargs": options["env_kwargs"]} == settings(folder)
+    assert (trajectory is not None) == (name == "given")
+
+
+def test_an_evaluation(laboratory, call):
+    (chain, model), options = call(repeating(read_folder(Path("runs/evaluation"))))
+    again = {"env": model.env_id, "env_kwargs": model.env_kwargs, "chain": "runs/training", **options}
+    assert again == settings(Path("runs/evaluation"))
+    assert len(chain.skills) > 0
+
+
+def test_a_comparison(laboratory, call):
+    folder = read_folder(Path("runs/comparison"))
+    (planners, env), options = call(repeating(folder))
+    chosen = {name: options[name] for name in ("env_kwargs", "seeds", "max_transitions", "max_seconds", "max_memory")}
+    sweep = make_sweep(planners, env, **chosen)
+    assert to_toml(sweep.config()) == to_toml(folder.config)
+
+
+def test_a_comparison_of_other_seeds_is_a_script(laboratory, monkeypatch):
+    folder = read_folder(laboratory / "runs/comparison")
+    other = Folder(folder.path, folder.kind, folder.config | {"seeds": [7, 3], "max_memory": 900.5}, None, [])
+    called = []
+    monkeypatch.setattr("pbcs_ompl.experiments.compare.compare",
+                        lambda *words, out, **options: called.append((words, options)))
+    exec(repeating(other), {"__name__": "__main__"})
+    (words, options), = called
+    assert to_toml(make_sweep(*words, **options).config()) == to_toml(other.config)
+
+
+def test_a_study_and_one_that_was_changed(laboratory, call, monkeypatch, tmp_path):
+    folder = read_folder(Path("runs/study"))
+    (found,), options = call(repeating(folder))
+    again = {"study": found.id, "folder": str(found.folder), "seeds": options["seeds"], **found.sweep}
+    assert again == folder.config
+    changed = Folder(folder.path, folder.kind, folder.config | {"sides": 3}, folder.result, [])
+    assert repeating(changed) == ""
+    assert repeating(Folder(folder.path, folder.kind, folder.config | {"folder": "gone"}, None, [])) == ""
+
+
+def test_what_has_not_ended_can_go_on(laboratory, call, monkeypatch):
+    assert going_on(read_folder(Path("runs/training"))) == ""
+    assert going_on(read_folder(Path("runs/given"))) == "pbcs train --resume runs/given --max-transitions 2400"
+    for name in ("comparison", "study"):
+        folder = read_folder(Path("runs") / name)
+        assert going_on(folder) == ""
+        _, options = call(going_on(Folder(folder.path, folder.kind, folder.config, None, [])))
+        assert Path(options["out"]) == folder.path
+
+
+@pytest.mark.parametrize(("changes", "kind"), [
+    ({"planner": "Mine"}, "plan"), ({"env": "nowhere/Thing-v0"}, "plan"), ({"agent": "Mine"}, "training")])
+def test_python_objects_have_no_command(laboratory, changes, kind):
+    folder = read_folder(laboratory / "runs" / kind)
+    assert repeating(Folder(folder.path, kind, folder.config | changes, None, [])) == ""
+
+
+words = st.text(st.characters(exclude_categories=["Cs", "Cc"]), min_size=1, max_size=6)
+values = st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=5)
+options = st.dictionaries(words.filter(lambda word: not word.startswith("--")), values | st.lists(values), max_size=3)
+rules = st.fixed_dictionaries({}, optional={"--goal": words, "--feature": words, "--start-seed": st.integers(0, 99)})
+
+
+@given(env=words.filter(lambda word: not word.startswith("-")), options=options, rules=rules)
+def test_any_environment_comes_back_from_the_command_line(env, options, rules):
+    parser = build_parser()
+    parsed = parse(parser, shlex.split(shlex.join(["plan", *environment_words(env, options | rules)])))
+    assert isinstance(parsed, Namespace)
+    assert (parsed.env, parsed.env_kwargs) == (env, options | rules)
