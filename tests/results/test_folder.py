@@ -12,8 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pbcs_ompl.results import folder as run_folder
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
+from pbcs_ompl.results import folder as run_folder
 from pbcs_ompl.results.folder import (
     RunFolder,
     read_arrays,
