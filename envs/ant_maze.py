@@ -6,8 +6,8 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.envs.maze.layout import MazeLayout
 from pbcs_ompl.envs.mujoco_env import FAR, FAST, BatchedMujocoEnv, mujoco
 from pbcs_ompl.envs.walls_fcl import WallsFcl

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.envs import box_disc_kernels as kernels
 from pbcs_ompl.envs.point_env import CompiledStep, PointEnv
 from pbcs_ompl.envs.rendering import rasterise

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
 
 Point = tuple[float, float]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.envs.line_env import LineEnv
 
 

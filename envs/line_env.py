@@ -6,8 +6,8 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from pbcs_ompl.core.contracts import Array, BoolArray, Transition
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
+from pbcs_ompl.core.types import Array, BoolArray, Transition
 
 MAX_STEP = 0.1
 HIGH = 1.0

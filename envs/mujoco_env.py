@@ -8,9 +8,9 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from pbcs_ompl.core.contracts import Array, BoolArray, Transition
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
 from pbcs_ompl.core.rendering import check_can_render, prefer_headless_rendering
+from pbcs_ompl.core.types import Array, BoolArray, Transition
 
 prefer_headless_rendering()  # before MuJoCo is imported
 

@@ -8,8 +8,8 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray, Transition
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray, Transition
 from pbcs_ompl.envs import point_kernels
 from pbcs_ompl.envs.rendering import rasterise
 

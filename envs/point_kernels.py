@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.types import Array, BoolArray
 
 # Places of the settings in the array `settings`, which every kernel takes.
 LIMIT, SCALE, GOAL_X, GOAL_Y, GOAL_RADIUS, PENALTY, TERMINATE, FIRST_FREE = range(8)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 
 PIXELS = 480
 FLOOR, WALL, GOAL, POINT = (255, 255, 255), (40, 40, 46), (120, 200, 120), (205, 50, 50)

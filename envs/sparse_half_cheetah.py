@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.envs.mujoco_env import FAR, FAST, BatchedMujocoEnv, mujoco
 
 CHEETAH = Path(gymnasium.__file__).parent / "envs/mujoco/assets/half_cheetah.xml"

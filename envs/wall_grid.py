@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, IndexArray
+from pbcs_ompl.core.types import Array, IndexArray
 
 CELLS_PER_UNIT = 5
 MARGIN = 1e-6

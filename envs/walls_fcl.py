@@ -8,7 +8,7 @@ from typing import Any
 import fcl
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.types import Array, BoolArray
 
 SEGMENT_RADIUS = 1e-9
 """Radius of the capsule around a segment: FCL reports a hit where the segment comes this close to a wall.

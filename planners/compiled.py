@@ -11,8 +11,8 @@ import numpy as np
 from numba import types
 from numba.core.dispatcher import Dispatcher
 
-from pbcs_ompl.core.contracts import Array, IndexArray
 from pbcs_ompl.core.errors import CallbackFailed
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.tree import Tree
 
 _vector = types.float64[::1]
@@ -40,7 +40,7 @@ class CompiledStep(NamedTuple):
 
 @runtime_checkable
 class CompiledModel(Protocol):
-    """A model (see core.contracts.ResetAnywhere) that offers its step to compiled loops."""
+    """A model (see core.interfaces.ResettableModel) that offers its step to compiled loops."""
 
     def compiled_step(self) -> CompiledStep | tuple[Any, Array, Array, IndexArray] | None:
         """Return the step, its real and its integer parameters; None where this model has none."""
@@ -71,7 +71,7 @@ def step_of(model: Any) -> CompiledStep | None:
         return None
     step, reals, table, integers = offered
     if not isinstance(step, Dispatcher) or STEP_SIGNATURE.args not in step.signatures:
-        raise CallbackFailed(f"compiled_step of {model.env_id} returned {step!r}; expected a function "
+        raise CallbackFailed(f"compiled_step of {model.spec.id} returned {step!r}; expected a function "
                              f"compiled by @njit(signature), where the signature is {STEP_SIGNATURE}")
     return CompiledStep(step, np.array(reals, np.float64), np.array(table, np.float64, order="C"),
                         np.array(integers, np.int64))

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from typing import Any
 
-from pbcs_ompl.core.contracts import Array, Counter, IndexArray
+from pbcs_ompl.core.types import Array, Counter, IndexArray
 from pbcs_ompl.planners.strategy import Space
 from pbcs_ompl.planners.tree import Tree
 

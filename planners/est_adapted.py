@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import IndexArray
+from pbcs_ompl.core.types import IndexArray
 from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert
 from pbcs_ompl.planners.kernels.sparse import draw_sparse
 from pbcs_ompl.planners.options import positive

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, IndexArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.compiled import CompiledStep
 from pbcs_ompl.planners.kernels import ex_loop
 from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert, select, tied_bins

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 from ompl import control as oc
 
-from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere, Transition
 from pbcs_ompl.core.errors import CallbackFailed, Mismatch
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, Counter, IndexArray, Transition
 from pbcs_ompl.planners.compiled import CompiledStep, step_of
 from pbcs_ompl.planners.door import Door
 from pbcs_ompl.planners.real_values import leaves, read, writer
@@ -29,7 +30,7 @@ class ModelDoor(Door):
 
     widest_batch = 1024
 
-    def __init__(self, si: Any, model: ResetAnywhere, counter: Counter):
+    def __init__(self, si: Any, model: ResettableModel, counter: Counter):
         self.counter = counter
         self._si = si
         self._model = model

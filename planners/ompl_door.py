@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from ompl import control as oc
 
-from pbcs_ompl.core.contracts import Array, Counter, IndexArray
 from pbcs_ompl.core.errors import CallbackFailed, UnsupportedSpace
+from pbcs_ompl.core.types import Array, Counter, IndexArray
 from pbcs_ompl.planners.door import Door
 from pbcs_ompl.planners.real_values import bounds, leaves, writer
 from pbcs_ompl.planners.strategy import Space

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import IndexArray
+from pbcs_ompl.core.types import IndexArray
 from pbcs_ompl.planners.options import positive_integer
 from pbcs_ompl.planners.strategy import Space, Strategy
 from pbcs_ompl.planners.tree import Tree

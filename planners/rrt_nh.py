@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import IndexArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import IndexArray
 from pbcs_ompl.planners.kernels import nearest
 from pbcs_ompl.planners.strategy import Space, Strategy
 from pbcs_ompl.planners.tree import Tree

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, IndexArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.rrt_nh import NearestToRandom
 from pbcs_ompl.planners.strategy import Space
 from pbcs_ompl.planners.tree import Tree

@@ -20,7 +20,7 @@ from pbcs_ompl.planners.options import check_names, positive_integer
 
 @dataclass(frozen=True)
 class StockPlanner:
-    """One of OMPL's planners (see core.contracts.PlannerFactory).
+    """One of OMPL's planners (see core.interfaces.PlannerFactory).
 
     Attributes:
         name: The class in `ompl.control`.

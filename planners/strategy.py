@@ -7,8 +7,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, IndexArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.options import check_names, keywords
 from pbcs_ompl.planners.tree import Tree
 

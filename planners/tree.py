@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 
 GROWTH = 4
 """Rooms that nobody has written to cost address space, but no memory; copies cost both memory and time."""

@@ -5,9 +5,10 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 from ompl import base as ob
 
-from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere
 from pbcs_ompl.core.errors import CallbackFailed, PbcsError
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.types import Array, Counter, IndexArray
 from pbcs_ompl.planners.compiled import CompiledStep, CompiledStrategy
 from pbcs_ompl.planners.door import Door
 from pbcs_ompl.planners.model_door import ModelDoor, check_finite
@@ -89,7 +90,7 @@ class TreePlanner(ob.Planner):
         """Transitions counted so far."""
         return 0 if self._door is None else self._door.counter.count
 
-    def use_model(self, model: ResetAnywhere, counter: Counter) -> None:
+    def use_model(self, model: ResettableModel, counter: Counter) -> None:
         """Propagate through `model` from now on, and count every transition in `counter`; drops the tree."""
         self._door = ModelDoor(self.getSpaceInformation(), model, counter)
         self._tree = None
@@ -210,7 +211,7 @@ class StrategyPlanner(TreePlanner):
 
     @classmethod
     def build(cls, si: Any, *, seed: int, **options: Any) -> Self:
-        """Return a new planner (see core.contracts.PlannerFactory)."""
+        """Return a new planner (see core.interfaces.PlannerFactory)."""
         return cls(si, seed=seed, **options)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.envs.maze.kernels import CLEARANCE
 from pbcs_ompl.envs.walls_fcl import WallsFcl
 

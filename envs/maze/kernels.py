@@ -7,7 +7,7 @@ All entry points share `_move`, so that one step and a batch of steps give the s
 import numpy as np
 from numba import njit
 
-from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
 from pbcs_ompl.envs.wall_grid import CELLS_PER_UNIT
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.envs.maze.generate import Passage, passages_of
 
 THICKNESS = 0.1

@@ -5,8 +5,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
+from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.envs.maze import kernels
 from pbcs_ompl.envs.maze.fcl_move import move_by_fcl
 from pbcs_ompl.envs.maze.layout import MazeLayout

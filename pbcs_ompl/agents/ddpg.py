@@ -15,7 +15,7 @@ from pbcs_ompl.agents.ddpg_kernel import Constants, Stack, update_many, update_o
 from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.agents.trained_network import TrainedNetwork, adam_rates
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 
 
 @dataclass(frozen=True)

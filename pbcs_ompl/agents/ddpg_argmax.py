@@ -22,7 +22,7 @@ from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.agents.streams import uniform
 from pbcs_ompl.agents.trained_network import TrainedNetwork
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 
 
 @dataclass(frozen=True)

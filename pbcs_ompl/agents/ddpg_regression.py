@@ -20,7 +20,7 @@ from pbcs_ompl.agents.replay import Batch
 from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.agents.trained_network import TrainedNetwork
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 
 
 @dataclass(frozen=True)

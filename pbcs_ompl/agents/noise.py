@@ -15,8 +15,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
+from pbcs_ompl.core.types import Array, BoolArray
 
 
 class Noise(Protocol):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from pbcs_ompl.agents.streams import hashed, stream_keys
-from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 
 FIRST_ALLOCATION = 4096
 

@@ -21,7 +21,7 @@ from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.agents.streams import normal, stream_keys
 from pbcs_ompl.agents.trained_network import TrainedNetwork, TrainedTensor
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 
 LOG_DEVIATION = -20.0, 2.0
 """Bounds of the actor's log-deviation; outside of them it has no slope."""

@@ -15,9 +15,9 @@ from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.streams import stream_keys
 from pbcs_ompl.agents.trained_network import TrainedNetwork, adam_rates
 from pbcs_ompl.agents.update import Compile, choose_device, compiled, quick_arithmetic
-from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption, Mismatch, PbcsError, UnsupportedSpace
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.types import Array, BoolArray
 
 CHUNK_ROWS = 25_600
 """Transitions that are drawn from the replay buffers at a time."""

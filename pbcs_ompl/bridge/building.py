@@ -7,8 +7,8 @@ from typing import Any
 from ompl import base as ob
 
 from pbcs_ompl.core import registry
-from pbcs_ompl.core.contracts import PlannerFactory
 from pbcs_ompl.core.errors import InvalidOption, PbcsError, did_you_mean
+from pbcs_ompl.core.interfaces import PlannerFactory
 
 Recipe = Callable[..., Any]
 

@@ -9,7 +9,8 @@ import numpy as np
 from numba import njit
 
 from pbcs_ompl.bridge.tree import TreeArrays
-from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, Counter, IndexArray
 
 Step = Callable[[list[float], list[float]], list[float]]
 POINTS_PER_DECADE = 10
@@ -43,7 +44,7 @@ class Trace:
     another order; for them every state that the propagator produces is copied (8 bytes a dimension).
     """
 
-    def __init__(self, model: ResetAnywhere):
+    def __init__(self, model: ResettableModel):
         self._model = model
         self._values = array("d")
         self._counts, self._seconds = [0], [0.0]
@@ -98,7 +99,7 @@ def log_spaced(most: int) -> IndexArray:
     return np.unique(points[(points > 0) & (points <= most)])
 
 
-def _shares(model: ResetAnywhere, states: Array, points: IndexArray) -> Array:
+def _shares(model: ResettableModel, states: Array, points: IndexArray) -> Array:
     """Return the share of the cells that the first `points` [K] of the states [N, D] lie in [K]."""
     edges = np.array(model.bin_size)
     while np.prod(shape := _cells_per_axis(model, edges)) > MOST_CELLS:
@@ -110,7 +111,7 @@ def _shares(model: ResetAnywhere, states: Array, points: IndexArray) -> Array:
     return _count_cells(table, columns, model.feature_low, edges, shape, points, seen) / len(seen)
 
 
-def _cells_per_axis(model: ResetAnywhere, edges: Array) -> IndexArray:
+def _cells_per_axis(model: ResettableModel, edges: Array) -> IndexArray:
     numbers = (model.feature_high - model.feature_low) / edges
     return np.maximum(1, np.ceil(numbers - 1e-9)).astype(np.int64)
 

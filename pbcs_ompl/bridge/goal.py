@@ -8,8 +8,8 @@ from ompl import base as ob
 
 from pbcs_ompl.bridge.layout import blocks, state_reader
 from pbcs_ompl.bridge.watch import Watch
-from pbcs_ompl.core.contracts import ResetAnywhere
 from pbcs_ompl.core.errors import CallbackFailed
+from pbcs_ompl.core.interfaces import ResettableModel
 
 
 class EnvironmentGoal(ob.GoalRegion):
@@ -19,7 +19,7 @@ class EnvironmentGoal(ob.GoalRegion):
     [Matheron2020] ch. 3, whatever bias they are set to.
     """
 
-    def __init__(self, space_information: Any, model: ResetAnywhere, watch: Watch):
+    def __init__(self, space_information: Any, model: ResettableModel, watch: Watch):
         super().__init__(space_information)
         self.setThreshold(float(model.goal_threshold))
         self._read = state_reader(blocks(len(model.state_low), model.feature_dims))

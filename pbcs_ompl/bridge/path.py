@@ -7,11 +7,12 @@ from ompl import control as oc
 
 from pbcs_ompl.bridge.layout import blocks, control_reader, state_reader, state_writer
 from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
 from pbcs_ompl.core.errors import Mismatch
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 
 
-def to_trajectory(path: Any, model: ResetAnywhere, *, step_size: float = 1.0, planner: str = "",
+def to_trajectory(path: Any, model: ResettableModel, *, step_size: float = 1.0, planner: str = "",
                   seed: int = 0) -> Trajectory:
     """Return the trajectory of a PathControl.
 
@@ -40,12 +41,12 @@ def to_trajectory(path: Any, model: ResetAnywhere, *, step_size: float = 1.0, pl
     all_states = np.array(states)
     all_actions = np.array(actions).reshape(len(actions), len(model.action_low))
     rewards = model.transition(all_states[:-1], all_actions).rewards if actions else np.empty(0)
-    return Trajectory(env_id=model.env_id, env_kwargs=model.env_kwargs, states=all_states,
+    return Trajectory(environment=model.spec, states=all_states,
                       actions=all_actions, rewards=np.asarray(rewards, dtype=np.float64), planner=planner,
                       seed=seed)
 
 
-def to_path(trajectory: Trajectory, space_information: Any, model: ResetAnywhere) -> Any:
+def to_path(trajectory: Trajectory, space_information: Any, model: ResettableModel) -> Any:
     """Return the PathControl of a trajectory, with one control for each step."""
     write = state_writer(blocks(len(model.state_low), model.feature_dims))
     path = oc.PathControl(space_information)

@@ -19,11 +19,14 @@ from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.bridge.tree import TreeArrays, tree_of
 from pbcs_ompl.bridge.versions import planning_versions
 from pbcs_ompl.bridge.watch import failure
-from pbcs_ompl.core.contracts import BatchPlanner, Counter, ProgressCallback, ResetAnywhere
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.interfaces import BatchPlanner, ResettableModel
 from pbcs_ompl.core.registry import load_environments
 from pbcs_ompl.core.seeding import SeedTree
-from pbcs_ompl.resettable import make, open_model
+from pbcs_ompl.core.types import Counter, ProgressCallback
+from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.folder import CONFIG, PROVENANCE, RESULT, RunFolder
 
 TRAJECTORY = "trajectory.npz"
@@ -38,8 +41,9 @@ class HoldsError(Protocol):
     def error(self) -> Any: ...
 
 
-def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
+def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "Ex", *,
          env_kwargs: dict[str, Any] | None = None, planner_kwargs: dict[str, Any] | None = None,
+         goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
          seed: int = 0, max_transitions: int = 1_000_000, max_seconds: float | None = None,
          out: str | Path | None = None, coverage: bool = False,
          on_progress: ProgressCallback | None = None) -> PlanResult:
@@ -50,11 +54,12 @@ def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
     there to be looked at.
 
     Args:
-        env: A Gymnasium id, an environment, or an adapter of one (see `pbcs_ompl.resettable`).
+        env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model.
         planner: A registered name, `module:attribute`, an `ompl.base.Planner` class, or a factory
             (a strategy class is one).
         env_kwargs: Options of the environment, when `env` is an id.
         planner_kwargs: Options of the planner.
+        goal, feature, start_seed: See `pbcs_ompl.make`.
         seed: Equal seeds give equal paths.
         max_transitions: The most environment steps.
         max_seconds: The most wall time of the search; None for any.
@@ -63,13 +68,13 @@ def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
         on_progress: Called a few times a second with {"transitions", "seconds"}.
 
     Raises:
-        UnknownName, InvalidOption, InvalidState, NoResetAnywhere, UnsupportedSpace: wrong input.
+        UnknownName, InvalidOption, InvalidState, NotResettable, UnsupportedSpace: wrong input.
         PlannerUnavailable: the installed OMPL cannot build the planner.
         CallbackFailed: the environment or the strategy raised, or returned NaN.
         RunFolderError: `out` exists, is in use, or cannot be written.
     """
     limits = checked_limits(max_transitions, max_seconds)
-    model = open_model(env, env_kwargs)
+    model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
     spec = PlannerSpec(planner, planner_kwargs or {})
     with _new_folder(out) as folder:
         counter = Counter(limits.max_transitions)
@@ -81,7 +86,7 @@ def plan(env: str | gymnasium.Env | ResetAnywhere, planner: Any = "Ex", *,
             collision_checks=counter.count + problem.watch.validity_checks, seconds=seconds, nodes=len(tree.states),
             path_length=None if trajectory is None else trajectory.length,
             replay_ok=None if trajectory is None else trajectory.replays_exactly(_fresh(model)),
-            planner=spec.name, env=model.env_id, seed=seed, out=None if out is None else str(out),
+            planner=spec.name, env=model.spec.id, seed=seed, out=None if out is None else str(out),
             trajectory=trajectory, tree=tree,
             coverage=None if trace is None else trace.coverage(tree, counter.count, seconds))
         if folder is not None:
@@ -127,10 +132,10 @@ def _solution(problem: Problem, spec: PlannerSpec, seed: int) -> Trajectory | No
     return trajectory if reached else None
 
 
-def _fresh(model: ResetAnywhere) -> ResetAnywhere:
+def _fresh(model: ResettableModel) -> ResettableModel:
     """Return a new environment of the same kind; the same one when nobody can build another."""
     load_environments()
-    return make(model.env_id, model.env_kwargs) if model.env_id in gymnasium.registry else model
+    return make(model.spec) if model.spec.id in gymnasium.registry else model
 
 
 @contextmanager
@@ -153,12 +158,12 @@ def _new_folder(out: str | Path | None) -> Iterator[RunFolder | None]:
             raise
 
 
-def _write(folder: RunFolder, result: PlanResult, model: ResetAnywhere, spec: PlannerSpec,
+def _write(folder: RunFolder, result: PlanResult, model: ResettableModel, spec: PlannerSpec,
            limits: Limits) -> None:
     if result.trajectory is not None:
         result.trajectory.save(folder.path / TRAJECTORY)
     result.tree.save(folder.path / TREE)
     folder.write_config({
-        "env": model.env_id, "planner": spec.name, "seed": result.seed, **limits._asdict(),
-        "env_kwargs": model.env_kwargs, "planner_kwargs": spec.options, "versions": planning_versions()})
+        "kind": "plan", "planner": spec.name, "seed": result.seed, **limits._asdict(),
+        "environment": model.spec.to_dict(), "planner_kwargs": spec.options, "versions": planning_versions()})
     folder.write_result(result.summary())

@@ -15,9 +15,10 @@ from pbcs_ompl.bridge.propagator import make_propagator
 from pbcs_ompl.bridge.spaces import make_control_space, make_state_space
 from pbcs_ompl.bridge.validity import make_validity
 from pbcs_ompl.bridge.watch import Watch
-from pbcs_ompl.core.contracts import Array, Counter, ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption, InvalidState, UnsupportedSpace
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.types import Array, Counter
 
 
 class Problem:
@@ -30,7 +31,7 @@ class Problem:
         watch: The transitions counted, and the first exception of a callback.
     """
 
-    def __init__(self, setup: Any, model: ResetAnywhere, start: Array, watch: Watch):
+    def __init__(self, setup: Any, model: ResettableModel, start: Array, watch: Watch):
         self.setup = setup
         self.model = model
         self.start = start
@@ -53,7 +54,7 @@ class Problem:
         self.setup.setStateValidityChecker(_never)
 
 
-def make_problem(model: ResetAnywhere, *, counter: Counter, start: Array | None = None, seed: int = 0,
+def make_problem(model: ResettableModel, *, counter: Counter, start: Array | None = None, seed: int = 0,
                  trace: Trace | None = None) -> Problem:
     """Build the control problem of an environment: one control is one step, and costs one transition.
 
@@ -112,16 +113,16 @@ def quiet_ompl() -> Iterator[None]:
         ou.setLogLevel(level)
 
 
-def _check_model(model: ResetAnywhere) -> None:
+def _check_model(model: ResettableModel) -> None:
     for name in ("state_low", "state_high", "action_low", "action_high"):
         bounds = getattr(model, name)
         if not np.all(np.isfinite(bounds)):
-            raise UnsupportedSpace(f"{name} of {model.env_id} is {bounds}; OMPL needs finite bounds")
+            raise UnsupportedSpace(f"{name} of {model.spec.id} is {bounds}; OMPL needs finite bounds")
     if not model.goal_threshold > 0:
-        raise InvalidOption(f"goal_threshold of {model.env_id} is {model.goal_threshold}; expected > 0")
+        raise InvalidOption(f"goal_threshold of {model.spec.id} is {model.goal_threshold}; expected > 0")
 
 
-def _check_start(model: ResetAnywhere, start: Array) -> Array:
+def _check_start(model: ResettableModel, start: Array) -> Array:
     begin = np.array(start, dtype=np.float64)
     if begin.shape != model.state_low.shape:
         raise InvalidState(f"the start has shape {begin.shape}; expected {model.state_low.shape}")
@@ -133,7 +134,7 @@ def _check_start(model: ResetAnywhere, start: Array) -> Array:
         raise InvalidState(f"the start has {begin[dim]} in dimension {dim}; expected between "
                            f"{model.state_low[dim]} and {model.state_high[dim]}")
     if not model.is_valid(begin[None])[0]:
-        raise InvalidState(f"the start {begin.tolist()} is inside a wall of {model.env_id}, or not valid")
+        raise InvalidState(f"the start {begin.tolist()} is inside a wall of {model.spec.id}, or not valid")
     return begin
 
 

@@ -5,12 +5,12 @@ from typing import Any
 
 from pbcs_ompl.bridge.layout import blocks, control_reader, state_reader, state_writer
 from pbcs_ompl.bridge.watch import Watch, check_finite
-from pbcs_ompl.core.contracts import ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
 
 Propagator = Callable[[Any, Any, float, Any], None]
 
 
-def make_propagator(model: ResetAnywhere, watch: Watch) -> Propagator:
+def make_propagator(model: ResettableModel, watch: Watch) -> Propagator:
     """Return the callback propagate(state, control, duration, result) that makes one step of the environment.
 
     OMPL calls it once for every step of a control's duration, with `result` being `state` from the second

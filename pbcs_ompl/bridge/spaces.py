@@ -7,10 +7,11 @@ from ompl import base as ob
 from ompl import control as oc
 
 from pbcs_ompl.bridge.layout import Block, blocks, state_reader
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 
 
-def make_state_space(model: ResetAnywhere) -> Any:
+def make_state_space(model: ResettableModel) -> Any:
     """Return the state space of a model, with the feature as its default projection.
 
     When the feature is a selection of the state's dimensions, the others have weight 0: distances between
@@ -34,7 +35,7 @@ def make_state_space(model: ResetAnywhere) -> Any:
     return space
 
 
-def make_control_space(state_space: Any, model: ResetAnywhere) -> Any:
+def make_control_space(state_space: Any, model: ResettableModel) -> Any:
     """Return the control space of a model: the box of its actions."""
     space = oc.RealVectorControlSpace(state_space, len(model.action_low))
     space.setBounds(_bounds(model.action_low, model.action_high))
@@ -44,7 +45,7 @@ def make_control_space(state_space: Any, model: ResetAnywhere) -> Any:
 class FeatureProjection(ob.ProjectionEvaluator):
     """The projection of a state on a feature that OMPL's own evaluators cannot express."""
 
-    def __init__(self, space: Any, model: ResetAnywhere):
+    def __init__(self, space: Any, model: ResettableModel):
         super().__init__(space)
         parts = blocks(len(model.state_low), model.feature_dims)
         self._read = state_reader(parts)
@@ -63,7 +64,7 @@ class FeatureProjection(ob.ProjectionEvaluator):
         projection[:] = self._feature(np.array([self._read(state)]))[0]
 
 
-def _projection(space: Any, spaces: list[Any], parts: list[Block], model: ResetAnywhere) -> Any:
+def _projection(space: Any, spaces: list[Any], parts: list[Block], model: ResettableModel) -> Any:
     cells = [float(size) for size in model.bin_size]
     explored = [index for index, part in enumerate(parts) if part.explored]
     if model.feature_dims is None or len(explored) > 1:

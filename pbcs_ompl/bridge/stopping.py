@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from pbcs_ompl.bridge.watch import Watch
-from pbcs_ompl.core.contracts import ProgressCallback
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import ProgressCallback
 
 SECONDS_BETWEEN_REPORTS = 0.25
 

@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.bridge.versions import environment_versions
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, Mismatch
-from pbcs_ompl.results.folder import plain, read_arrays, write_arrays
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.plain import plain
+from pbcs_ompl.core.types import Array
+from pbcs_ompl.results.folder import read_arrays, write_arrays
 
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +23,7 @@ class Trajectory:
     """States visited by a sequence of actions.
 
     Attributes:
-        env_id, env_kwargs: What `gymnasium.make` needs to build the environment.
+        environment: What makes the model that it was found in.
         states: States [T+1, D], the first is the start.
         actions: Actions [T, A], each held for one step.
         rewards: Rewards [T].
@@ -28,8 +31,7 @@ class Trajectory:
         versions: Versions of the packages the steps depend on.
     """
 
-    env_id: str
-    env_kwargs: dict[str, Any]
+    environment: EnvSpec
     states: Array
     actions: Array
     rewards: Array
@@ -48,7 +50,7 @@ class Trajectory:
         Raises:
             RunFolderError: the file cannot be written.
         """
-        words = {"format": FORMAT, "env_id": self.env_id, "env_kwargs": self.env_kwargs,
+        words = {"format": FORMAT, "environment": self.environment.to_dict(),
                  "planner": self.planner, "seed": self.seed, "versions": self.versions}
         write_arrays(Path(path), metadata=np.array(json.dumps(words, default=plain)), states=self.states,
                      actions=self.actions, rewards=self.rewards)
@@ -83,11 +85,12 @@ class Trajectory:
             raise DamagedFile(f"{path} is damaged: states {states.shape}, actions {actions.shape}, rewards "
                               f"{rewards.shape}; expected [T+1, D], [T, A], [T]")
         try:
-            return cls(states=states, actions=actions, rewards=rewards, **words)
-        except TypeError as error:
+            environment = EnvSpec.from_dict(words.pop("environment"))
+            return cls(environment, states=states, actions=actions, rewards=rewards, **words)
+        except (KeyError, TypeError) as error:
             raise DamagedFile(f"{path} is not a trajectory: {error}") from error
 
-    def replay(self, model: ResetAnywhere) -> Array:
+    def replay(self, model: ResettableModel) -> Array:
         """Return the states [T+1, D] that the actions lead to from the first state."""
         states = np.empty_like(self.states)
         states[0] = self.states[0]
@@ -95,21 +98,18 @@ class Trajectory:
             states[step + 1] = model.transition(states[step][None], action[None]).states[0]
         return states
 
-    def replays_exactly(self, model: ResetAnywhere) -> bool:
+    def replays_exactly(self, model: ResettableModel) -> bool:
         """Whether `replay` gives the same states, bit for bit."""
         return self.replay(model).tobytes() == self.states.tobytes()
 
-    def check_belongs_to(self, model: ResetAnywhere) -> None:
+    def check_belongs_to(self, model: ResettableModel) -> None:
         """Refuse a model that the trajectory was not made in.
 
         Raises:
             Mismatch: another environment, other options, or other versions of what its steps depend on.
         """
-        ours = json.loads(json.dumps(self.env_kwargs, default=plain))
-        theirs = json.loads(json.dumps(model.env_kwargs, default=plain))
-        if (self.env_id, ours) != (model.env_id, theirs):
-            raise Mismatch(f"the trajectory was made in {self.env_id} {json.dumps(ours)}, not in "
-                           f"{model.env_id} {json.dumps(theirs)}")
+        if not self.environment.same_as(model.spec):
+            raise Mismatch(f"the trajectory was made in {self.environment}, not in {model.spec}")
         installed = environment_versions()
         for package, version in self.versions.items():
             if installed.get(package) != version:

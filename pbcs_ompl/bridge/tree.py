@@ -9,8 +9,9 @@ import numpy as np
 from ompl import base as ob
 
 from pbcs_ompl.bridge.layout import blocks, state_reader
-from pbcs_ompl.core.contracts import Array, IndexArray, ResetAnywhere
 from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.results.folder import read_arrays, write_arrays
 
 
@@ -67,7 +68,7 @@ class TreeArrays:
         return cls(arrays["states"], arrays["parents"], arrays.get("controls"))
 
 
-def tree_of(planner: Any, model: ResetAnywhere, space_information: Any) -> TreeArrays:
+def tree_of(planner: Any, model: ResettableModel, space_information: Any) -> TreeArrays:
     """Return the tree of a planner: its own arrays, or what OMPL's PlannerData tell.
 
     PlannerData carry no controls in the installed OMPL, and KPIECE1 keeps only some of the states it visited.

@@ -7,10 +7,10 @@ import numpy as np
 
 from pbcs_ompl.bridge.layout import blocks, state_reader
 from pbcs_ompl.bridge.watch import Watch
-from pbcs_ompl.core.contracts import ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
 
 
-def make_validity(model: ResetAnywhere, watch: Watch) -> Callable[[Any], bool]:
+def make_validity(model: ResettableModel, watch: Watch) -> Callable[[Any], bool]:
     """Return the callback is_valid(state): in the bounds, and `model.is_valid` (FCL where there are walls).
 
     A state that the propagator has just produced is one the environment is in; it is not tested again, so

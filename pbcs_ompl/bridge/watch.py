@@ -3,8 +3,8 @@
 from math import isfinite
 
 from pbcs_ompl.bridge.coverage import Trace
-from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import CallbackFailed, PbcsError
+from pbcs_ompl.core.types import Counter
 
 
 class Watch:

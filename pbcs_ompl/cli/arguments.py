@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from pbcs_ompl.cli.values import choice, fraction, integer, json_object, part, seconds
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
 METHODS = ("pbcs", "pb", "backplay", "plain", "bootstrapped", "offline")
@@ -94,18 +95,12 @@ def parse(parser: Parser, words: Sequence[str]) -> argparse.Namespace:
     arguments, surplus = parser.parse_known_args(words)
     if surplus:
         raise InvalidOption(f"unexpected word {surplus[0]!r} (see pbcs {arguments.verb} --help)")
-    for rule in ("goal", "feature", "start_seed"):  # the model is then made again wherever its env_kwargs go
-        if vars(arguments).get(rule) is not None:
-            key = f"--{rule.replace('_', '-')}"
-            arguments.env_kwargs = _with_rule(arguments.env_kwargs, key, vars(arguments)[rule])
     return arguments
 
 
-def _with_rule(env_kwargs: Any, key: str, rule: Any) -> Any:
-    """Return the options of an environment, or of each of several, with a rule among them."""
-    if isinstance(env_kwargs, list):
-        return [{**options, key: rule} for options in env_kwargs]
-    return {**env_kwargs, key: rule}
+def environment(arguments: argparse.Namespace) -> EnvSpec:
+    """Return the environment that the options name."""
+    return EnvSpec(arguments.env, arguments.env_kwargs, arguments.goal, arguments.feature, arguments.start_seed)
 
 
 def _check_options(words: Sequence[str], parser: Parser) -> None:

@@ -24,7 +24,8 @@ def run(arguments: Namespace) -> int:
     budget = len(planners) * max(len(arguments.env), len(arguments.env_kwargs)) * arguments.seeds
     try:
         with executor(arguments) as jobs, Report("compare", count="runs", budget=budget) as report:
-            comparison = compare(planners, arguments.env, env_kwargs=arguments.env_kwargs, seeds=arguments.seeds,
+            comparison = compare(planners, arguments.env, env_kwargs=arguments.env_kwargs, goal=arguments.goal,
+                                 feature=arguments.feature, start_seed=arguments.start_seed, seeds=arguments.seeds,
                                  max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds,
                                  max_memory=arguments.max_memory, jobs=jobs, out=out, on_progress=report)
     except KeyboardInterrupt:

@@ -9,6 +9,7 @@ from platform import platform, python_version
 from typing import Any
 
 from pbcs_ompl.bridge.building import PlannerSpec
+from pbcs_ompl.cli.arguments import environment
 from pbcs_ompl.cli.models import describe
 from pbcs_ompl.cli.terminal import conclude
 from pbcs_ompl.core.errors import PbcsError
@@ -102,7 +103,7 @@ def _environments() -> list[str]:
 def _check(arguments: Namespace) -> dict[str, Any]:
     from pbcs_ompl.resettable import check_resettable, make
 
-    model = make(arguments.env, arguments.env_kwargs)
+    model = make(environment(arguments))
     report = check_resettable(model)
     return {"env": report.env_id, "ok": report.ok, "checks": [asdict(check) for check in report.checks],
             **describe(model)}

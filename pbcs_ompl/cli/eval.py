@@ -19,15 +19,15 @@ def run(arguments: Namespace) -> int:
     """Evaluate and report. Returns 1 when no rollout reached the goal."""
     folder = Path(arguments.dir)
     chain = SkillChain.load(folder / CHAIN if (folder / CHAIN).is_dir() else folder)
-    model = make(chain.env_id, chain.env_kwargs)
+    model = make(chain.environment)
     if arguments.video:
         check_video(arguments.video)
     with nullcontext() if arguments.out is None else RunFolder(arguments.out) as out:
         evaluation = evaluate(chain, model, episodes=arguments.episodes, epsilon=arguments.epsilon)
         summary = evaluation.summary()
         if out is not None:
-            out.write_config({"chain": folder, "env": chain.env_id, "episodes": arguments.episodes,
-                              "epsilon": arguments.epsilon, "env_kwargs": chain.env_kwargs})
+            out.write_config({"kind": "eval", "chain": folder, "episodes": arguments.episodes,
+                              "epsilon": arguments.epsilon, "environment": chain.environment.to_dict()})
             out.write_result(summary)
     if arguments.video:
         write_video(model, chain.rollout(model, epsilon=arguments.epsilon), arguments.video)

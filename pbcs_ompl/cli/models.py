@@ -3,9 +3,9 @@
 import sys
 from typing import Any
 
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
-from pbcs_ompl.resettable.model import FEATURE_KEY, GOAL_KEY
 
 
 def describe(model: Any) -> dict[str, Any]:
@@ -15,21 +15,21 @@ def describe(model: Any) -> dict[str, Any]:
             "state_size": len(model.state_low), "feature": feature_words(model), "goal": goal_words(model)}
 
 
-def feature_words(model: ResetAnywhere) -> str:
+def feature_words(model: ResettableModel) -> str:
     """Return what is explored, within which bounds, and where these come from."""
     env = getattr(model, "env", None)
-    rule = model.env_kwargs.get(FEATURE_KEY, "the adapter's choice")
+    rule = model.spec.feature or "the adapter's choice"
     source = f", from {env.bounds_from}" if isinstance(env, RestorableEnv) else ""
     return f"{rule}: {_vector(model.feature_low)} to {_vector(model.feature_high)}{source}"
 
 
-def goal_words(model: ResetAnywhere) -> str:
+def goal_words(model: ResettableModel) -> str:
     """Return what a success is."""
-    rule = model.env_kwargs.get(GOAL_KEY, "what the environment reports")
+    rule = model.spec.goal or "what the environment reports"
     return f"{rule} (distance < {model.goal_threshold:g})"
 
 
-def note_rules(model: ResetAnywhere) -> None:
+def note_rules(model: ResettableModel) -> None:
     """Tell on stderr what is explored and sought where an adapter, not the environment, decides it."""
     if isinstance(getattr(model, "env", None), RestorableEnv):
         print(f"feature   {feature_words(model)}\ngoal      {goal_words(model)}", file=sys.stderr)

@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pbcs_ompl.cli.terminal import warn
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
 from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 
 if TYPE_CHECKING:
     from pbcs_ompl.bridge.plan import PlanResult
@@ -24,17 +25,17 @@ def draw(name: str, picture: Callable[[], Any], out: Path) -> None:
         warn(f"no picture {name}: {error}")
 
 
-def draw_tree(model: ResetAnywhere, result: "PlanResult", out: Path) -> None:
+def draw_tree(model: ResettableModel, result: "PlanResult", out: Path) -> None:
     """Draw tree.png: the exploration tree, and the path when there is one."""
     from pbcs_ompl.figures.tree import tree_figure
 
     tree, trajectory = result.tree, result.trajectory
-    title = f"{result.planner} on {model.env_id}: {result.transitions:,} transitions, {result.nodes:,} nodes"
+    title = f"{result.planner} on {model.spec.id}: {result.transitions:,} transitions, {result.nodes:,} nodes"
     draw("tree.png", lambda: tree_figure(model, tree.states, tree.parents, title=title,
                                          path=None if trajectory is None else trajectory.states), out)
 
 
-def draw_chain(model: ResetAnywhere, chain: "SkillChain", trajectory: Array | None,
+def draw_chain(model: ResettableModel, chain: "SkillChain", trajectory: Array | None,
                rollout: Array | None, title: str, out: Path) -> None:
     """Draw chain.png: phase 1, the chain's rollout and its activation sets."""
     from pbcs_ompl.figures.chain import chain_figure

@@ -5,6 +5,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from pbcs_ompl.bridge.plan import PlanResult, plan
+from pbcs_ompl.cli.arguments import environment
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.models import note_rules
 from pbcs_ompl.cli.pictures import draw_tree
@@ -18,7 +19,7 @@ from pbcs_ompl.results.command_words import environment_words
 def run(arguments: Namespace) -> int:
     """Plan, draw, report. Returns 1 when the goal was not reached within the budget."""
     out = Path(arguments.out or fresh_folder("plan", arguments.env, arguments.planner, arguments.seed))
-    model = make(arguments.env, arguments.env_kwargs)
+    model = make(environment(arguments))
     note_rules(model)
     if arguments.video:
         check_video(arguments.video)
@@ -40,8 +41,8 @@ def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[
     if result.solved:
         replay = "replays exactly" if result.replay_ok else "DOES NOT REPLAY (not deterministic?)"
         lines.append(("path", f"{short(result.path_length)} steps, {replay}"))
-        environment = environment_words(arguments.env, arguments.env_kwargs)
-        following = shlex.join(["pbcs", "train", *environment, "--path", str(out)])
+        words = environment_words(environment(arguments))
+        following = shlex.join(["pbcs", "train", *words, "--path", str(out)])
     else:
         following = "the same with a larger --max-transitions or --max-seconds, or another --planner"
     return [*lines, ("files", list_files(out)), ("next", following)]

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 
 from pbcs_ompl.core.formatting import duration, short
-from pbcs_ompl.results.folder import plain
+from pbcs_ompl.core.plain import plain
 
 SECONDS_BETWEEN_LINES = 10.0
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pbcs_ompl.bridge.plan import TRAJECTORY
 from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.cli.arguments import build_parser
+from pbcs_ompl.cli.arguments import build_parser, environment
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_chain
 from pbcs_ompl.cli.terminal import Report, conclude, list_files, warn
@@ -46,7 +46,7 @@ def _train(arguments: Namespace, out: Path) -> TrainResult:
         if arguments.resume:
             return resume(out, on_progress=report, **budget)
         trajectory = None if arguments.path is None else _read_trajectory(Path(arguments.path))
-        return train(arguments.env, env_kwargs=arguments.env_kwargs, trajectory=trajectory, out=out,
+        return train(environment(arguments), trajectory=trajectory, out=out,
                      method=arguments.method, planner=arguments.planner, planner_kwargs=arguments.planner_kwargs,
                      agent=arguments.agent, preset=arguments.preset, settings=arguments.settings,
                      agent_settings=arguments.agent_settings, seed=arguments.seed, device=arguments.device,
@@ -69,10 +69,10 @@ def _read_trajectory(path: Path) -> Trajectory:
 def _draw(result: TrainResult, out: Path) -> None:
     if result.chain is None:
         return
-    model = make(result.chain.env_id, result.chain.env_kwargs)
+    model = make(result.chain.environment)
     trajectory = None if result.trajectory is None else result.trajectory.states
     rollout = None if result.stalled else result.chain.rollout(model)
-    title = (f"{model.env_id}: {len(result.chain.skills)} skills, "
+    title = (f"{model.spec.id}: {len(result.chain.skills)} skills, "
              f"{result.train_transitions:,} transitions, {result.updates:,} updates")
     draw_chain(model, result.chain, trajectory, rollout, title, out)
 

@@ -44,7 +44,7 @@ class UnsupportedSpace(PbcsError):
     """An observation or action space that the toolkit cannot work with."""
 
 
-class NoResetAnywhere(PbcsError):
+class NotResettable(PbcsError):
     """An environment that offers no way to restore a state."""
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 
 Act = Callable[[Array], Array]
 """Actions [S, B, A] for observations [S, B, O]."""

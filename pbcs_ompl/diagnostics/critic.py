@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.diagnostics.actor import Act
 
 Value = Callable[[Array, Array], Array]

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import Array, BoolArray
 
 
 def rewarded_share(rewards: Array, mask: BoolArray | None = None) -> Array:

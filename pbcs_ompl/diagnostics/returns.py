@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.diagnostics.actor import Act
 from pbcs_ompl.diagnostics.critic import Value
 
 
-def returns_of(model: ResetAnywhere, act: Act, states: Array, controls: Array, discount: float,
+def returns_of(model: ResettableModel, act: Act, states: Array, controls: Array, discount: float,
                horizon: int) -> Array:
     """Return Q^pi [S, B]: the discounted rewards of one control, then of the actor, for `horizon` steps.
 
@@ -39,7 +40,7 @@ def returns_of(model: ResetAnywhere, act: Act, states: Array, controls: Array, d
     return returns.reshape(seeds, count)
 
 
-def distance_to_returns(model: ResetAnywhere, act: Act, value: Value, states: Array, controls: Array,
+def distance_to_returns(model: ResettableModel, act: Act, value: Value, states: Array, controls: Array,
                         discount: float, horizon: int) -> Array:
     """Return the mean of |Q(s, a) - Q^pi(s, a)| over states [S, B, D] and controls [S, B, A] [S].
 

@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED
 from pbcs_ompl.figures.maze import draw_line, legend_below, plane, stage
 
 
-def chain_figure(model: ResetAnywhere, *, trajectory: Array | None, rollout: Array | None,
+def chain_figure(model: ResettableModel, *, trajectory: Array | None, rollout: Array | None,
                  activations: Sequence[tuple[Array, float]], title: str = "") -> Figure:
     """Draw the planned trajectory [T+1, D], one rollout [T+1, D] of the chain and its activation sets.
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.figures.canvas import new_panels
 
 Runs = Mapping[str, Sequence[Mapping[str, Any]]]

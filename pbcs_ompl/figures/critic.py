@@ -5,15 +5,16 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import Figure
 
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
 from pbcs_ompl.core.errors import Mismatch
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.figures.canvas import RED
 from pbcs_ompl.figures.maze import draw_line, legend_below, stage
 
 FIELD, ARROWS = 120, 18
 
 
-def critic_figure(model: ResetAnywhere, policy: Callable[[Array], Array],
+def critic_figure(model: ResettableModel, policy: Callable[[Array], Array],
                   critic: Callable[[Array, Array], Array], *, rollout: Array | None = None,
                   title: str = "") -> Figure:
     """Draw Q(s, pi(s)) as a green field, pi(s) as black arrows and one rollout [T+1, D] in red.
@@ -26,7 +27,7 @@ def critic_figure(model: ResetAnywhere, policy: Callable[[Array], Array],
         Mismatch: the state has other dimensions than the two of the picture.
     """
     if len(model.state_low) != 2:
-        raise Mismatch(f"a critic field needs states of two dimensions, {model.env_id} has "
+        raise Mismatch(f"a critic field needs states of two dimensions, {model.spec.id} has "
                        f"{len(model.state_low)}")
     figure, axes = stage(model, title)
     states, extent = _grid(model, FIELD)
@@ -46,7 +47,7 @@ def critic_figure(model: ResetAnywhere, policy: Callable[[Array], Array],
     return figure
 
 
-def _grid(model: ResetAnywhere, count: int) -> tuple[Array, tuple[float, float, float, float]]:
+def _grid(model: ResettableModel, count: int) -> tuple[Array, tuple[float, float, float, float]]:
     """Return the centres [count**2, 2] of a grid of cells over the state bounds, row by row; its extent."""
     low, high = model.state_low, model.state_high
     middle = (np.arange(count) + 0.5) / count

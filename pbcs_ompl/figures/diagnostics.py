@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
 from pbcs_ompl.core.statistics import wilson
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.figures.canvas import RED, new_figure
 
 

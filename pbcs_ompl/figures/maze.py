@@ -8,14 +8,15 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
 from pbcs_ompl.core.errors import Mismatch
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.figures.canvas import WALL, new_figure
 
 GOAL = "#f1c40f"
 
 
-def stage(model: ResetAnywhere, title: str) -> tuple[Figure, Axes]:
+def stage(model: ResettableModel, title: str) -> tuple[Figure, Axes]:
     """Return a figure whose axes show the model's walls and goal, at equal scale.
 
     Raises:
@@ -27,14 +28,14 @@ def stage(model: ResetAnywhere, title: str) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def furnish(axes: Axes, model: ResetAnywhere) -> None:
+def furnish(axes: Axes, model: ResettableModel) -> None:
     """Draw the model's walls and goal into axes, at equal scale.
 
     Raises:
         Mismatch: as `stage`.
     """
     if len(model.feature_low) < 2:
-        raise Mismatch(f"a picture needs two feature dimensions, {model.env_id} has {len(model.feature_low)}")
+        raise Mismatch(f"a picture needs two feature dimensions, {model.spec.id} has {len(model.feature_low)}")
     corners = [Rectangle((x0, y0), x1 - x0, y1 - y0) for x0, y0, x1, y1 in np.reshape(model.walls, (-1, 4))]
     axes.add_collection(PatchCollection(corners, facecolor=WALL, edgecolor="none", zorder=2))
     if model.goal_circle is not None:
@@ -44,7 +45,7 @@ def furnish(axes: Axes, model: ResetAnywhere) -> None:
     _frame(axes, model)
 
 
-def plane(model: ResetAnywhere, states: Array) -> Array:
+def plane(model: ResettableModel, states: Array) -> Array:
     """Return where states [B, D] lie in the picture [B, 2]."""
     return model.feature(np.atleast_2d(states))[:, :2]
 
@@ -62,7 +63,7 @@ def legend_below(axes: Axes) -> None:
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=4, frameon=False, fontsize=9)
 
 
-def _frame(axes: Axes, model: ResetAnywhere) -> None:
+def _frame(axes: Axes, model: ResettableModel) -> None:
     low, high = model.feature_low[:2], model.feature_high[:2]
     margin = 0.02 * float(np.max(high - low))
     axes.set_xlim(low[0] - margin, high[0] + margin)

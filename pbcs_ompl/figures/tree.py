@@ -4,14 +4,15 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from pbcs_ompl.core.contracts import Array, IndexArray, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.figures.canvas import RED
 from pbcs_ompl.figures.maze import draw_line, legend_below, plane, stage
 
 MOST_EDGES = 100_000
 
 
-def tree_figure(model: ResetAnywhere, states: Array, parents: IndexArray, *, path: Array | None = None,
+def tree_figure(model: ResettableModel, states: Array, parents: IndexArray, *, path: Array | None = None,
                 title: str = "") -> Figure:
     """Draw a tree of states [N, D] with parents [N] (a root's parent is -1), and a path [T+1, D] in red.
 

@@ -1,15 +1,17 @@
 """A film of states of an environment, as the environment itself renders them."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
-from pbcs_ompl.core.errors import InvalidOption, MissingDependency, NoResetAnywhere
+from pbcs_ompl.core.errors import InvalidOption, MissingDependency, NotResettable
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.rendering import check_can_render
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.folder import write_atomically
 
@@ -33,13 +35,13 @@ def check_video(path: str | Path) -> None:
     _imageio()
 
 
-def write_video(model: ResetAnywhere, states: Array, path: str | Path) -> Path:
+def write_video(model: ResettableModel, states: Array, path: str | Path) -> Path:
     """Write a film of `states` [T, D] of `model`, atomically, and return its path.
 
     Raises:
         InvalidOption: see `check_video`.
         MissingDependency: imageio, or what the environment renders with, is not installed.
-        NoResetAnywhere: the environment cannot be made to render, or go to these states.
+        NotResettable: the environment cannot be made to render, or go to these states.
         RunFolderError: the file cannot be written.
     """
     check_video(path)
@@ -57,9 +59,9 @@ def write_video(model: ResetAnywhere, states: Array, path: str | Path) -> Path:
     return path
 
 
-def _frames(model: ResetAnywhere, states: Array) -> Iterator[Array]:
+def _frames(model: ResettableModel, states: Array) -> Iterator[Array]:
     """Yield an image [H, W, 3] of each state."""
-    stage: Any = make(model.env_id, {**model.env_kwargs, "render_mode": "rgb_array"})
+    stage: Any = make(replace(model.spec, kwargs={**model.spec.kwargs, "render_mode": "rgb_array"}))
     env = stage.env
     if hasattr(env, "inner") and hasattr(env.inner, "data"):
         check_can_render()
@@ -68,9 +70,9 @@ def _frames(model: ResetAnywhere, states: Array) -> Iterator[Array]:
         try:
             frame = env.render()
         except gymnasium.error.DependencyNotInstalled as error:
-            raise MissingDependency(f"{model.env_id} cannot render: {error}") from error
+            raise MissingDependency(f"{model.spec.id} cannot render: {error}") from error
         if frame is None:
-            raise NoResetAnywhere(f"{model.env_id} renders nothing for render_mode='rgb_array'")
+            raise NotResettable(f"{model.spec.id} renders nothing for render_mode='rgb_array'")
         yield np.asarray(frame, dtype=np.uint8)
     env.close()
 

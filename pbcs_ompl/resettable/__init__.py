@@ -8,6 +8,6 @@ Example:
 
 from pbcs_ompl.resettable.adapt import adapt
 from pbcs_ompl.resettable.check import Check, ResetReport, check_resettable
-from pbcs_ompl.resettable.make import make, open_model
+from pbcs_ompl.resettable.make import make
 
-__all__ = ["Check", "ResetReport", "adapt", "check_resettable", "make", "open_model"]
+__all__ = ["Check", "ResetReport", "adapt", "check_resettable", "make"]

@@ -5,8 +5,8 @@ from typing import Any, cast
 
 import gymnasium
 
-from pbcs_ompl.core.contracts import ResetAnywhere, VectorisedEnv
-from pbcs_ompl.core.errors import InvalidOption, NoResetAnywhere
+from pbcs_ompl.core.errors import InvalidOption, NotResettable
+from pbcs_ompl.core.interfaces import ResettableModel, VectorisedEnv
 from pbcs_ompl.resettable.adapters.classic import AttributeEnv, VectorEnv, keeps_state
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel, offers_get_set_state
 from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, MujocoModel, check_observes, shows_mujoco
@@ -19,13 +19,13 @@ from pbcs_ompl.resettable.wrappers import unwrap
 
 HOW_TO = (
     "implement `get_env_state() -> array [D]` and `set_env_state(array)` beside `step` (simple), or the "
-    "protocol `pbcs_ompl.core.contracts.VectorisedEnv` (fast)"
+    "protocol `pbcs_ompl.core.interfaces.VectorisedEnv` (fast)"
 )
-MODEL_MEMBERS = {*ResetAnywhere.__annotations__, *(n for n in vars(ResetAnywhere) if not n.startswith("_"))}
+MODEL_MEMBERS = {*ResettableModel.__annotations__, *(n for n in vars(ResettableModel) if not n.startswith("_"))}
 
 
-def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None) -> ResetAnywhere:
-    """Return `env` as a `ResetAnywhere`; a model that is already adapted is returned as it is.
+def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None) -> ResettableModel:
+    """Return `env` as a `ResettableModel`; a model that is already adapted is returned as it is.
 
     The first that fits: its own `VectorisedEnv` protocol, its own `get_env_state` and `set_env_state`, MuJoCo,
     classic control, deep copies if they prove faithful, and replayed actions, of whose slowness a warning tells.
@@ -37,7 +37,7 @@ def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | Featur
         feature: What planners explore, in place of the adapter's choice (see `rules.feature_rule`).
 
     Raises:
-        NoResetAnywhere: its states cannot be restored, or a wrapper would be lost; says what to implement.
+        NotResettable: its states cannot be restored, or a wrapper would be lost; says what to implement.
         UnsupportedSpace: its actions are no finite vector Box, or its observations no vector Box.
         InvalidOption: a rule does not parse, or does not fit the environment.
     """
@@ -73,7 +73,7 @@ def _restorable(inner: Any, goal: Any, feature: Any) -> RestorableEnv:
     return ReplayedEnv(inner, goal, feature)
 
 
-def _model_of(env: RestorableEnv) -> ResetAnywhere:
+def _model_of(env: RestorableEnv) -> ResettableModel:
     return MujocoModel(env) if isinstance(env, MujocoEnv) else GetSetStateModel(env)
 
 
@@ -83,15 +83,15 @@ def _is_vector(env: Any) -> bool:
     return not isinstance(env.get_env_state(), dict)
 
 
-def _as_model(model: Any) -> ResetAnywhere:
+def _as_model(model: Any) -> ResettableModel:
     missing = sorted(name for name in MODEL_MEMBERS if not hasattr(model, name))
     if isinstance(model, str):
-        raise NoResetAnywhere(f"expected a gymnasium.Env, got the string {model!r}; call make({model!r})")
+        raise NotResettable(f"expected a gymnasium.Env, got the string {model!r}; call make({model!r})")
     if len(missing) == len(MODEL_MEMBERS):
-        raise NoResetAnywhere(f"expected a gymnasium.Env or a ResetAnywhere, got {type(model).__name__}")
+        raise NotResettable(f"expected a gymnasium.Env or a ResettableModel, got {type(model).__name__}")
     if missing:
-        raise NoResetAnywhere(f"{type(model).__name__} is no ResetAnywhere; it lacks {', '.join(missing)}")
-    return cast(ResetAnywhere, model)
+        raise NotResettable(f"{type(model).__name__} is no ResettableModel; it lacks {', '.join(missing)}")
+    return cast(ResettableModel, model)
 
 
 def _name(env: gymnasium.Env) -> str:

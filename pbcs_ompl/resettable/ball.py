@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
+from pbcs_ompl.core.types import Array, BoolArray
 
 MAX_ROUNDS = 200
 

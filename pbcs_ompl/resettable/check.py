@@ -8,8 +8,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array
 from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapt import adapt
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 
@@ -82,7 +82,7 @@ def check_resettable(env: Any, *, seed: int = 0) -> ResetReport:
     try:
         trial = _Trial(model, seed)
     except Exception as error:  # as above
-        return ResetReport(model.env_id, (Check("can be stepped", False, _describe(error)),))
+        return ResetReport(model.spec.id, (Check("can be stepped", False, _describe(error)),))
     tests = [
         ("a restored state continues as before", trial.restored),
         ("so it does after other steps and another reset", trial.disturbed),
@@ -94,7 +94,7 @@ def check_resettable(env: Any, *, seed: int = 0) -> ResetReport:
     ]
     if "arbitrary" in model.capabilities:
         tests.append(("valid states within the bounds come back as set", trial.arbitrary))
-    return ResetReport(model.env_id, tuple(_run(name, test) for name, test in tests))
+    return ResetReport(model.spec.id, tuple(_run(name, test) for name, test in tests))
 
 
 def _run(name: str, test: Callable[[], str]) -> Check:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Box
 
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 
 MARGIN = 1.0
 """What random steps have not reached is expected within so many times the range that they have."""

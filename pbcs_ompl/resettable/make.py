@@ -3,19 +3,20 @@
 import inspect
 import os
 from contextlib import redirect_stderr
+from dataclasses import replace
 from importlib import import_module
 from io import StringIO
 from typing import Any
 
 import gymnasium
-from gymnasium.envs.registration import EnvSpec, load_env_creator
+from gymnasium.envs import registration
 
-from pbcs_ompl.core.contracts import ResetAnywhere
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, UnknownName, did_you_mean
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.registry import load_environments
 from pbcs_ompl.core.rendering import prefer_headless_rendering, renderer_is_missing
 from pbcs_ompl.resettable.adapt import adapt
-from pbcs_ompl.resettable.model import FEATURE_KEY, GOAL_KEY, START_KEY
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 
 KNOWN_TO_FAIL = ("Fetch", "Hand", "FrankaKitchen", "MaMuJoCo")
@@ -23,52 +24,73 @@ KNOWN_TO_FAIL = ("Fetch", "Hand", "FrankaKitchen", "MaMuJoCo")
 ROBOTICS = ("PointMaze", "AntMaze", "Adroit", *KNOWN_TO_FAIL)
 
 
-def make(env_id: str, env_kwargs: dict[str, Any] | None = None, *, goal: str | GoalRule | None = None,
-         feature: str | FeatureRule | None = None) -> ResetAnywhere:
-    """Make the environment `env_id` and return it as a `ResetAnywhere`.
+def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[str, Any] | None = None, *,
+         goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
+         **kwargs: Any) -> ResettableModel:
+    """Return the resettable model of an environment, however it is given.
 
     Args:
-        env_id: An id known to Gymnasium, such as "pbcs/Maze-v0". Packages that announce environments through
-            the entry point group `pbcs_ompl.envs` are imported first; "module:id" imports `module` too.
-        env_kwargs: Options of the environment. The keys "--goal" and "--feature" are those of a model's own
-            `env_kwargs`: they stand for the two arguments below. "--start-seed" fixes the seed of every start.
+        env: An id known to Gymnasium, such as "pbcs/Maze-v0" ("module:id" imports `module` first); an `EnvSpec`; a
+            Gymnasium environment, which the model then moves about; or a model, which is returned as it is.
+            Packages that announce environments through the entry point group `pbcs_ompl.envs` are imported first.
+        env_kwargs, kwargs: Options of the environment, when `env` is an id.
         goal, feature: Rules in place of the environment's success and the adapter's feature (see `rules`).
+        start_seed: Every episode starts as `reset(seed=start_seed)` does.
 
     Raises:
         UnknownName: no such id.
-        InvalidOption: an option that the environment does not have, or a value that it refuses.
+        InvalidOption: an option that the environment does not have, or a value that it refuses; options, rules or a
+            start seed for what is built already.
         MissingDependency: the environment needs a library that is not installed.
-        NoResetAnywhere, UnsupportedSpace: see `adapt`.
+        NotResettable, UnsupportedSpace: see `adapt`.
     """
+    options = {**(env_kwargs or {}), **kwargs}
+    if isinstance(env, str):
+        return _make(EnvSpec(env, options, start_seed=start_seed), goal, feature)
+    if options:
+        raise InvalidOption("options of the environment go with its id; this one is built already: leave out "
+                            f"{', '.join(options)}")
+    if isinstance(env, EnvSpec):
+        return _make(env if start_seed is None else replace(env, start_seed=start_seed),
+                     env.goal if goal is None else goal, env.feature if feature is None else feature)
+    return _with_start(adapt(env, goal=goal, feature=feature), start_seed)
+
+
+def _make(spec: EnvSpec, goal: str | GoalRule | None, feature: str | FeatureRule | None) -> ResettableModel:
     load_environments()
     prefer_headless_rendering()
-    kwargs = dict(env_kwargs or {})
-    kept_goal, kept_feature = kwargs.pop(GOAL_KEY, None), kwargs.pop(FEATURE_KEY, None)
-    start_seed = kwargs.pop(START_KEY, None)
-    spec = _find(env_id)
+    model = adapt(_gymnasium_make(spec), goal=goal, feature=feature)
+    # The id keeps its module, if it names one.
+    model.spec = replace(spec, goal=model.spec.goal, feature=model.spec.feature)
+    return model
+
+
+def _gymnasium_make(spec: EnvSpec) -> gymnasium.Env:
+    registered = _find(spec.id)
     try:
-        _check_options(spec, kwargs)
-        env = gymnasium.make(env_id, **kwargs)
+        _check_options(registered, spec.kwargs)
+        return gymnasium.make(spec.id, **spec.kwargs)
     except (gymnasium.error.DependencyNotInstalled, ModuleNotFoundError) as error:
-        extra = "robotics" if env_id.startswith(ROBOTICS) else "mujoco"
+        extra = "robotics" if spec.id.startswith(ROBOTICS) else "mujoco"
         remedy = f" (pip install 'pbcs-ompl[{extra}]')" if "mujoco" in str(error).lower() else ""
-        raise MissingDependency(f"environment {env_id!r} needs what is not installed: {error}{remedy}") from error
+        raise MissingDependency(f"environment {spec.id!r} needs what is not installed: {error}{remedy}") from error
     except (AttributeError, RuntimeError) as error:  # so mujoco fails on import
         if not renderer_is_missing() and "MUJOCO_GL" not in str(error):
             raise
         raise MissingDependency(f"mujoco cannot be imported with MUJOCO_GL={os.environ['MUJOCO_GL']}: install what it "
                                 f"names, set MUJOCO_GL=egl, or unset it") from error
     except AssertionError as error:
-        if not env_id.startswith(KNOWN_TO_FAIL):
+        if not spec.id.startswith(KNOWN_TO_FAIL):
             raise
-        raise MissingDependency(f"{env_id} does not run with the installed mujoco: pip install 'mujoco<=3.8' (the "
+        raise MissingDependency(f"{spec.id} does not run with the installed mujoco: pip install 'mujoco<=3.8' (the "
                                 f"mazes and Adroit run with newer ones)") from error
     except (TypeError, ValueError) as error:
-        raise InvalidOption(f"{env_id} refuses its options {kwargs}: {error}") from error
-    model = adapt(env, goal=kept_goal if goal is None else goal, feature=kept_feature if feature is None else feature)
-    model.env_id = env_id  # with its module, if it names one
+        raise InvalidOption(f"{spec.id} refuses its options {spec.kwargs}: {error}") from error
+
+
+def _with_start(model: ResettableModel, start_seed: int | None) -> ResettableModel:
     if start_seed is not None:
-        _fix_start(model, start_seed)
+        model.spec = replace(model.spec, start_seed=start_seed)
     return model
 
 
@@ -82,21 +104,7 @@ def is_known(env_id: str) -> bool:
     return True
 
 
-def open_model(env: str | gymnasium.Env | ResetAnywhere, env_kwargs: dict[str, Any] | None = None) -> ResetAnywhere:
-    """Return the model of what a user names as an environment: an id, an environment, or a model.
-
-    Raises:
-        InvalidOption: options for an environment that is built already.
-        UnknownName, MissingDependency, NoResetAnywhere, UnsupportedSpace: see `make` and `adapt`.
-    """
-    if isinstance(env, str):
-        return make(env, env_kwargs or {})
-    if env_kwargs:
-        raise InvalidOption("env_kwargs go with the id of an environment; this one is built already")
-    return adapt(env)
-
-
-def _find(env_id: str) -> EnvSpec:
+def _find(env_id: str) -> registration.EnvSpec:
     module, _, name = env_id.rpartition(":")
     try:
         if module:
@@ -109,15 +117,6 @@ def _find(env_id: str) -> EnvSpec:
         raise MissingDependency(f"environment {env_id!r}: there is no module {error.name!r}{remedy}") from error
     except gymnasium.error.Error as error:
         raise UnknownName("environment", env_id, _choices(name)) from error
-
-
-def _fix_start(model: Any, seed: Any) -> None:
-    """Let every episode of a model begin as `reset(seed)`: one start and one goal, as the thesis's MDPs have."""
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise InvalidOption(f"{START_KEY}={seed!r}: expected an integer >= 0")
-    begin = model.initial_state
-    model.initial_state = lambda _=None: begin(seed)
-    model.env_kwargs[START_KEY] = seed
 
 
 def _register_robotics() -> None:
@@ -133,11 +132,11 @@ def _choices(env_id: str) -> list[str]:
     return ids if close else [known for known in ids if known.startswith("pbcs/")]
 
 
-def _check_options(spec: EnvSpec, kwargs: dict[str, Any]) -> None:
+def _check_options(spec: registration.EnvSpec, kwargs: dict[str, Any]) -> None:
     """Refuse options that the environment's constructor does not take."""
     creator: Any = spec.entry_point
     if isinstance(creator, str):
-        creator = load_env_creator(creator)
+        creator = registration.load_env_creator(creator)
     parameters = inspect.signature(creator).parameters
     if any(p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters.values()):
         return

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 
 
 def has_map(env: Any) -> bool:

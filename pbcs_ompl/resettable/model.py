@@ -5,18 +5,18 @@ from typing import Any, cast
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray, Counter, ResetAnywhere
-from pbcs_ompl.core.errors import InvalidOption, NoResetAnywhere
+from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.errors import InvalidOption, NotResettable
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, BoolArray, Counter
 from pbcs_ompl.resettable.ball import valid_in_ball
 from pbcs_ompl.resettable.rollouts import reached_in_ball
 
 DEFAULT_EPISODE_STEPS = 1000
-GOAL_KEY, FEATURE_KEY, START_KEY = "--goal", "--feature", "--start-seed"
-"""Where `env_kwargs` keep the rules that make the same model again; see `pbcs_ompl.resettable.rules`."""
 
 
 class Model:
-    """The half of a `ResetAnywhere` that does not depend on how states are restored.
+    """The half of a `ResettableModel` that does not depend on how states are restored.
 
     Reads the optional attributes of an environment: `feature_dims` (default: all dimensions), `bin_size`
     (extent / 20), `walls` (none), `goal_circle` (none), `max_episode_steps` (that of its spec, else 1000),
@@ -33,11 +33,9 @@ class Model:
     def __init__(self, env: Any, state_low: Array, state_high: Array):
         self.env = env
         spec = env.spec
-        self.env_id = type(env).__qualname__ if spec is None else spec.id
-        self.env_kwargs: dict[str, Any] = {} if spec is None else dict(spec.kwargs)
-        self.env_kwargs.pop("render_mode", None)
-        rules = {GOAL_KEY: getattr(env, "goal_rule", None), FEATURE_KEY: getattr(env, "feature_rule", None)}
-        self.env_kwargs |= {key: rule for key, rule in rules.items() if rule is not None}
+        kwargs = {} if spec is None else {key: value for key, value in spec.kwargs.items() if key != "render_mode"}
+        self.spec = EnvSpec(type(env).__qualname__ if spec is None else spec.id, kwargs,
+                            getattr(env, "goal_rule", None), getattr(env, "feature_rule", None))
         self.state_low, self.state_high = _bounds(env, state_low, state_high)
         self.action_low = env.action_space.low.astype(np.float64)
         self.action_high = env.action_space.high.astype(np.float64)
@@ -45,7 +43,7 @@ class Model:
         self._dims = [int(d) for d in getattr(env, "feature_dims", range(size))]
         self.feature_dims: tuple[int, ...] | None = tuple(self._dims)
         if not self._dims or not all(0 <= d < size for d in self._dims):
-            raise NoResetAnywhere(f"{self.env_id}: feature_dims={self._dims}, but the state has {size}")
+            raise NotResettable(f"{self.spec.id}: feature_dims={self._dims}, but the state has {size}")
         self.feature_low, self.feature_high = self.state_low[self._dims], self.state_high[self._dims]
         extent = self.feature_high - self.feature_low
         self.bin_size = np.asarray(getattr(env, "bin_size", extent / 20.0), dtype=np.float64)
@@ -58,6 +56,12 @@ class Model:
         self._steer = getattr(env, "advance_towards", None)
         self._distance: Callable[[Array, Array], Array] | None = getattr(env, "distance", None)
         self._by_rollouts = bool(getattr(env, "perturb_by_rollouts", False))
+
+    def initial_state(self, seed: int | None = None) -> Array:
+        """Return the state [D] after `env.reset(seed=seed)`; the seed of the spec, where it has one, comes first."""
+        start_seed = self.spec.start_seed
+        self.env.reset(seed=seed if start_seed is None else start_seed)
+        return np.array(self.env.get_env_state(), dtype=np.float64)
 
     def feature(self, states: Array) -> Array:
         """Return the features [B, F] of states [B, D]: a copy of the feature dimensions."""
@@ -84,7 +88,7 @@ class Model:
             InvalidState: no valid state was found near `state`.
         """
         if self._by_rollouts:
-            model = cast(ResetAnywhere, self)
+            model = cast(ResettableModel, self)
             return reached_in_ball(model, np.asarray(state, dtype=np.float64), radius, count, rng, before, counter)
         return valid_in_ball(state, radius, count, rng, self.is_valid if reject_invalid else None)
 
@@ -100,7 +104,7 @@ class Model:
             InvalidOption: the environment offers no steering.
         """
         if self._steer is None:
-            raise InvalidOption(f"{self.env_id} cannot be steered: it has no `advance_towards(states, "
+            raise InvalidOption(f"{self.spec.id} cannot be steered: it has no `advance_towards(states, "
                                 f"targets)`; choose another planner")
         return self._steer(states, targets)
 
@@ -109,5 +113,5 @@ def _bounds(env: Any, low: Array, high: Array) -> tuple[Array, Array]:
     low, high = np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
     if low.ndim == 1 and low.shape == high.shape and np.isfinite(high - low).all() and (low < high).all():
         return low, high
-    raise NoResetAnywhere(f"{type(env).__name__}: state_low and state_high must be finite vectors of one "
+    raise NotResettable(f"{type(env).__name__}: state_low and state_high must be finite vectors of one "
                           f"length, low < high; got {low.tolist()} and {high.tolist()}")

@@ -2,14 +2,15 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, Counter, ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, Counter
 
 MAX_STEPS = 5
 MAX_ROUNDS = 50
 
 
-def reached_in_ball(model: ResetAnywhere, state: Array, radius: float, count: int, rng: np.random.Generator,
+def reached_in_ball(model: ResettableModel, state: Array, radius: float, count: int, rng: np.random.Generator,
                     before: Array | None = None, counter: Counter | None = None) -> Array:
     """Return states [count, D] within `radius` of `state` [D] that 0 to 5 random steps reach from it or from `before`.
 
@@ -39,7 +40,7 @@ def reached_in_ball(model: ResetAnywhere, state: Array, radius: float, count: in
     return found[:count]
 
 
-def _roll(model: ResetAnywhere, states: Array, rng: np.random.Generator, counter: Counter) -> Array:
+def _roll(model: ResettableModel, states: Array, rng: np.random.Generator, counter: Counter) -> Array:
     """Return what `states` [B, D] become in 0 to MAX_STEPS random steps each; ended episodes are left out."""
     steps = rng.integers(0, MAX_STEPS + 1, len(states))
     ended = np.zeros(len(states), dtype=np.bool_)

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
+from pbcs_ompl.core.types import Array
 
 
 class Outcome(NamedTuple):

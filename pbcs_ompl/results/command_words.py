@@ -3,14 +3,19 @@
 import json
 from typing import Any
 
-from pbcs_ompl.results.folder import plain
+from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.plain import plain
 
 
-def environment_words(env: str, env_kwargs: dict[str, Any]) -> list[str]:
-    """Return the options that name an environment. Rules, such as "--goal", are options of their own."""
-    options = {name: value for name, value in env_kwargs.items() if not name.startswith("--")}
-    rules = [f"{name}={value}" for name, value in env_kwargs.items() if name.startswith("--")]
-    return ["--env", env, *json_words("--env-kwargs", options), *rules]
+def environment_words(spec: EnvSpec) -> list[str]:
+    """Return the options that name an environment."""
+    return ["--env", spec.id, *json_words("--env-kwargs", spec.kwargs), *rule_words(spec)]
+
+
+def rule_words(spec: EnvSpec) -> list[str]:
+    """Return the options of goal, feature and start."""
+    rules = {"--goal": spec.goal, "--feature": spec.feature, "--start-seed": spec.start_seed}
+    return [f"{name}={value}" for name, value in rules.items() if value is not None]
 
 
 def json_words(option: str, values: dict[str, Any]) -> list[str]:

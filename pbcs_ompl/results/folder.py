@@ -13,6 +13,7 @@ from typing import IO, Any
 import numpy as np
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
+from pbcs_ompl.core.plain import plain
 from pbcs_ompl.results.lock import FolderLock
 from pbcs_ompl.results.provenance import provenance
 
@@ -192,19 +193,6 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         raise DamagedFile(f"{path} does not exist") from error
     except Exception as error:  # zipfile, zlib, ValueError, EOFError: all mean the same to the user
         raise DamagedFile(f"{path} is damaged: {error}") from error
-
-
-def plain(value: Any) -> Any:
-    """Turn NumPy values and paths into what JSON knows."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, frozenset | set):
-        return sorted(value)
-    raise TypeError(f"cannot write {type(value).__name__} as JSON")
 
 
 def to_toml(config: dict[str, Any]) -> str:

@@ -5,9 +5,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.registry import load
+from pbcs_ompl.core.types import Array, BoolArray
 
 
 class Agent(Protocol):

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray, ResetAnywhere
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.results.folder import read_arrays, read_json, write_arrays, write_json
 from pbcs_ompl.skills.episodes import with_random_actions
 from pbcs_ompl.skills.goals import ActivationSet, Goal
@@ -56,33 +57,31 @@ class SkillChain:
     Attributes:
         skills: In the order of execution.
         start: The state it was trained to start from [D].
-        env_id, env_kwargs: The environment it was trained in.
+        environment: The environment it was trained in.
         time_limit: Steps after which an execution counts as failed.
     """
 
     skills: tuple[Skill, ...]
     start: Array
-    env_id: str
-    env_kwargs: dict[str, Any]
+    environment: EnvSpec
     time_limit: int
 
     @classmethod
     def of(cls, skills: list[Skill], milestones: Milestones) -> "SkillChain":
         """Return the chain of skills that were trained along `milestones`."""
         model, limit = milestones.model, PATIENCE * milestones.settings.max_steps * len(skills)
-        return cls(tuple(skills), milestones.states[0], model.env_id, model.env_kwargs, limit)
+        return cls(tuple(skills), milestones.states[0], model.spec, limit)
 
-    def check_belongs_to(self, model: ResetAnywhere) -> None:
+    def check_belongs_to(self, model: ResettableModel) -> None:
         """Raise Mismatch when the chain was trained in another environment."""
-        if (self.env_id, self.env_kwargs) != (model.env_id, model.env_kwargs):
-            raise Mismatch(f"the skill chain was trained in {self.env_id} {self.env_kwargs}, "
-                           f"not in {model.env_id} {model.env_kwargs}")
+        if not self.environment.same_as(model.spec):
+            raise Mismatch(f"the skill chain was trained in {self.environment}, not in {model.spec}")
 
-    def controller(self, model: ResetAnywhere, count: int = 1) -> "ChainController":
+    def controller(self, model: ResettableModel, count: int = 1) -> "ChainController":
         """Return a controller of `count` executions side by side."""
         return ChainController(self, model, count)
 
-    def rollouts(self, model: ResetAnywhere, starts: Array, *, epsilon: float = 0.0,
+    def rollouts(self, model: ResettableModel, starts: Array, *, epsilon: float = 0.0,
                  rng: np.random.Generator | None = None, max_steps: int | None = None) -> Rollouts:
         """Execute the chain from `starts` [B, D], replacing a share `epsilon` of the actions by random ones."""
         rng = rng or np.random.default_rng(0)
@@ -106,7 +105,7 @@ class SkillChain:
                 break
         return Rollouts(success, steps, controller.current, np.array(trace))
 
-    def rollout(self, model: ResetAnywhere, state: Array | None = None, *, epsilon: float = 0.0,
+    def rollout(self, model: ResettableModel, state: Array | None = None, *, epsilon: float = 0.0,
                 rng: np.random.Generator | None = None, max_steps: int | None = None) -> Array:
         """Return the states [T+1, D] of one execution from `state` [D], by default the chain's start."""
         first = self.start if state is None else state
@@ -121,7 +120,7 @@ class SkillChain:
             arrays |= to_arrays(skill.activation, f"activation{index}") | to_arrays(skill.goal, f"goal{index}")
         write_arrays(folder / "chain.npz", **arrays)
         write_json(folder / "chain.json", {
-            "format": FORMAT, "version": VERSION, "env_id": self.env_id, "env_kwargs": self.env_kwargs,
+            "format": FORMAT, "version": VERSION, "environment": self.environment.to_dict(),
             "time_limit": self.time_limit,
             "skills": [{"activation": kind_of(s.activation), "goal": kind_of(s.goal)} for s in self.skills]})
 
@@ -145,7 +144,7 @@ class SkillChain:
                 Skill(policy, from_arrays(entry["activation"], arrays, f"activation{index}"),
                       from_arrays(entry["goal"], arrays, f"goal{index}"))
                 for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
-            return cls(skills, arrays["start"], structure["env_id"], structure["env_kwargs"], structure["time_limit"])
+            return cls(skills, arrays["start"], EnvSpec.from_dict(structure["environment"]), structure["time_limit"])
         except (KeyError, ValueError) as error:
             raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error
 
@@ -153,7 +152,7 @@ class SkillChain:
 class ChainController:
     """Which skill each execution is in, and what to do there."""
 
-    def __init__(self, chain: SkillChain, model: ResetAnywhere, count: int):
+    def __init__(self, chain: SkillChain, model: ResettableModel, count: int):
         if not chain.skills:
             raise InvalidOption("the skill chain is empty")
         self.chain = chain

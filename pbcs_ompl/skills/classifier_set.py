@@ -7,7 +7,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from pbcs_ompl.core.contracts import Array, BoolArray, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, BoolArray
 
 REACH = 2.0
 """The set lies within so many times the radius of a ball: samples are drawn there, and nothing is known beyond."""
@@ -44,11 +45,11 @@ class ClassifierSet:
     weights_2: Array
     bias_2: Array
 
-    def distance(self, model: ResetAnywhere, states: Array) -> Array:
+    def distance(self, model: ResettableModel, states: Array) -> Array:
         """Return the distances [B] from states [B, D] to the centre."""
         return model.distance(states, self.center)
 
-    def contains(self, model: ResetAnywhere, states: Array) -> BoolArray:
+    def contains(self, model: ResettableModel, states: Array) -> BoolArray:
         """Return which of the states [B, D] lie in the set."""
         inside = self.distance(model, states) <= REACH * self.radius
         if inside.any():  # observing a simulator's states is slow

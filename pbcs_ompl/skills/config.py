@@ -6,8 +6,8 @@ from typing import Any
 
 from pbcs_ompl.agents.update import choose_device
 from pbcs_ompl.bridge.building import PlannerSpec
-from pbcs_ompl.core.contracts import ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption, UnknownName
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.skills.agent_door import Agent, load_agent
 from pbcs_ompl.skills.method import Method
 from pbcs_ompl.skills.offline import Bootstrapped, Offline
@@ -75,7 +75,7 @@ class TrainConfig:
         """Return the preset's skill settings with this run's changes."""
         return skill_preset(self.preset, self.method).updated(self.settings)
 
-    def agent_factory(self, model: ResetAnywhere) -> Callable[[int], Agent]:
+    def agent_factory(self, model: ResettableModel) -> Callable[[int], Agent]:
         """Return a function that builds an agent for `model` from a seed."""
         kind, settings = load_agent(self.agent), self._agent_settings()
         return lambda seed: kind(model.observation_size, model.action_low, model.action_high, settings=settings,

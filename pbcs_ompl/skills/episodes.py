@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.skills.goals import Goal
 from pbcs_ompl.skills.shaping import shaped_rewards
 
@@ -45,7 +46,7 @@ class Episodes:
         return len(self.states)
 
 
-def run_episodes(model: ResetAnywhere, act: Act, goal: Goal, starts: Array, *, epsilon: float, max_steps: int,
+def run_episodes(model: ResettableModel, act: Act, goal: Goal, starts: Array, *, epsilon: float, max_steps: int,
                  rng: np.random.Generator, shaped: bool = True) -> Episodes:
     """Run one episode from each of `starts` [B, D] with an epsilon-greedy policy.
 
@@ -77,7 +78,7 @@ def run_episodes(model: ResetAnywhere, act: Act, goal: Goal, starts: Array, *, e
     return Episodes(reached, steps, *(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
-def with_random_actions(model: ResetAnywhere, controls: Array, epsilon: float, rng: np.random.Generator) -> Array:
+def with_random_actions(model: ResettableModel, controls: Array, epsilon: float, rng: np.random.Generator) -> Array:
     """Replace each of the controls [B, A] by a uniformly random action with probability `epsilon`."""
     if epsilon > 0:
         chosen = np.flatnonzero(rng.random(len(controls)) < epsilon)

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.skills.chain import SkillChain
@@ -36,7 +36,7 @@ class Evaluation:
                 "steps_median": self.steps_median, "epsilon": self.epsilon}
 
 
-def evaluate(chain: SkillChain, model: ResetAnywhere, *, episodes: int = 100, epsilon: float = 0.0,
+def evaluate(chain: SkillChain, model: ResettableModel, *, episodes: int = 100, epsilon: float = 0.0,
              seed: int = 0) -> Evaluation:
     """Execute the chain `episodes` times from the state it was trained to start from.
 

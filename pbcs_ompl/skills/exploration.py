@@ -6,8 +6,9 @@ from typing import cast
 import numpy as np
 
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.core.contracts import Array, BoolArray, ResetAnywhere, Transition
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, BoolArray, Transition
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Transitions:
     terminals: BoolArray
 
 
-def explore(model: ResetAnywhere, count: int, seed: int) -> Transitions:
+def explore(model: ResettableModel, count: int, seed: int) -> Transitions:
     """Explore `count` transitions with Ex, whether or not the goal is found on the way.
 
     Rewards are the environment's own. A transition is terminal as those of `Episodes` are.
@@ -42,18 +43,18 @@ def explore(model: ResetAnywhere, count: int, seed: int) -> Transitions:
     return Transitions(states, controls, outcome.rewards, outcome.states, outcome.terminated | outcome.success)
 
 
-def without_goal(model: ResetAnywhere) -> ResetAnywhere:
+def without_goal(model: ResettableModel) -> ResettableModel:
     """Return an environment whose goal is not to be found, for a planner that would stop there.
 
     Terminal states stay terminal. There is no compiled step: that of the environment knows the goal.
     """
-    return cast(ResetAnywhere, _WithoutGoal(model))
+    return cast(ResettableModel, _WithoutGoal(model))
 
 
 class _WithoutGoal:
-    def __init__(self, model: ResetAnywhere):
+    def __init__(self, model: ResettableModel):
         self._model = model
-        for name in ResetAnywhere.__annotations__:
+        for name in ResettableModel.__annotations__:
             setattr(self, name, getattr(model, name))
         self.initial_state, self.step_one, self.observe = model.initial_state, model.step_one, model.observe
         self.feature, self.is_valid, self.distance = model.feature, model.is_valid, model.distance

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from pbcs_ompl.core.contracts import Array, BoolArray, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, BoolArray
 
 
 class Goal(Protocol):
@@ -14,11 +15,11 @@ class Goal(Protocol):
         """The distance within which a state belongs to the goal."""
         ...
 
-    def distance(self, model: ResetAnywhere, states: Array) -> Array:
+    def distance(self, model: ResettableModel, states: Array) -> Array:
         """Return the distances [B] from states [B, D] to the centre of the goal."""
         ...
 
-    def contains(self, model: ResetAnywhere, states: Array) -> BoolArray:
+    def contains(self, model: ResettableModel, states: Array) -> BoolArray:
         """Return which of the states [B, D] lie in the goal."""
         ...
 
@@ -39,11 +40,11 @@ class Ball:
     center: Array
     radius: float
 
-    def distance(self, model: ResetAnywhere, states: Array) -> Array:
+    def distance(self, model: ResettableModel, states: Array) -> Array:
         """Return the distances [B] from states [B, D] to the centre."""
         return model.distance(states, self.center)
 
-    def contains(self, model: ResetAnywhere, states: Array) -> BoolArray:
+    def contains(self, model: ResettableModel, states: Array) -> BoolArray:
         """Return which of the states [B, D] lie in the ball."""
         return self.distance(model, states) <= self.radius
 
@@ -54,10 +55,10 @@ class Target:
 
     radius: float
 
-    def distance(self, model: ResetAnywhere, states: Array) -> Array:
+    def distance(self, model: ResettableModel, states: Array) -> Array:
         """Return the distances [B] from states [B, D] to the environment's goal."""
         return model.goal_distance(states)
 
-    def contains(self, model: ResetAnywhere, states: Array) -> BoolArray:
+    def contains(self, model: ResettableModel, states: Array) -> BoolArray:
         """Return which of the states [B, D] the environment calls a success."""
         return model.goal_distance(states) < self.radius

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, Counter, IndexArray
 from pbcs_ompl.skills.agent_door import Agent
 from pbcs_ompl.skills.chain import Skill
 from pbcs_ompl.skills.classifier_set import learn_set
@@ -33,7 +34,7 @@ class Learner:
         self.make_agent = make_agent
         self.milestones = milestones
         self.settings = milestones.settings
-        self.model: ResetAnywhere = milestones.model
+        self.model: ResettableModel = milestones.model
         self.counter = counter
         self.rng = rng
         self.updates_due = 0.0

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, Counter, IndexArray, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, Counter, IndexArray
 from pbcs_ompl.skills.goals import Ball, Goal, Target
 from pbcs_ompl.skills.policy import Frame
 from pbcs_ompl.skills.settings import SkillSettings
@@ -25,11 +26,11 @@ class Milestones:
     """
 
     states: Array
-    model: ResetAnywhere
+    model: ResettableModel
     settings: SkillSettings
 
     @classmethod
-    def of_plan(cls, states: Array, model: ResetAnywhere, settings: SkillSettings) -> "Milestones":
+    def of_plan(cls, states: Array, model: ResettableModel, settings: SkillSettings) -> "Milestones":
         """Return the milestones along the `states` [T+1, D] of a plan, without detours if the settings say so."""
         if settings.shorten and len(states) > 2:
             states = states[shorten(model, states, settings.radius)]

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from pbcs_ompl.agents.policy import Policy
-from pbcs_ompl.core.contracts import Array
 from pbcs_ompl.core.errors import DamagedFile, MissingDependency
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.results.folder import write_atomically
 
 HORIZON = 10

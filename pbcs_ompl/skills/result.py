@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.evaluation import Evaluation
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray
+from pbcs_ompl.core.types import Array, BoolArray
 
 GOAL_REWARD = 10.0
 

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, IndexArray, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, IndexArray
 
 
-def shorten(model: ResetAnywhere, states: Array, gap: float) -> IndexArray:
+def shorten(model: ResettableModel, states: Array, gap: float) -> IndexArray:
     """Return the indices [M] of the shortest way along `states` [T+1, D] from the first to the last.
 
     The way may go on from a state to the next one, or hop to any later state within `gap`. Exploration returns to

@@ -8,23 +8,28 @@ import gymnasium
 from pbcs_ompl.bridge.building import PlannerSpec
 from pbcs_ompl.bridge.problem import make_problem, quiet_ompl
 from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.core.contracts import Counter, ProgressCallback, ResetAnywhere
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, RunFolderError, TrainingStalled, UnknownName
-from pbcs_ompl.resettable import make, open_model
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Counter, ProgressCallback
+from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.folder import CONFIG, RESULT, RunFolder, read_toml
 from pbcs_ompl.skills.config import TrainConfig
 from pbcs_ompl.skills.result import TrainResult
 from pbcs_ompl.skills.training import CHECKPOINT, Training
 
 
-def train(env: str | gymnasium.Env | ResetAnywhere, *, env_kwargs: dict[str, Any] | None = None,
+def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, env_kwargs: dict[str, Any] | None = None,
+          goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
           trajectory: Trajectory | None = None, out: str | Path | None = None,
           on_progress: ProgressCallback | None = None, **options: Any) -> TrainResult:
     """Plan (unless a trajectory is given) and train skills along the plan.
 
     Args:
-        env: A Gymnasium id, an environment, or an adapter of one.
+        env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model.
         env_kwargs: Options of the environment, when `env` is an id.
+        goal, feature, start_seed: See `pbcs_ompl.make`.
         trajectory: A plan made before.
         out: A new folder for config.toml, result.json, trajectory.npz, chain/ and, until the end, checkpoint.npz.
         on_progress: Called after every session and test with plain numbers.
@@ -34,14 +39,14 @@ def train(env: str | gymnasium.Env | ResetAnywhere, *, env_kwargs: dict[str, Any
     Raises:
         UnknownName, InvalidOption: no such method, planner, agent, preset or setting; values out of range; a planner
             beside a trajectory.
-        NoResetAnywhere, UnsupportedSpace: the environment does not fit.
+        NotResettable, UnsupportedSpace: the environment does not fit.
         Mismatch: the trajectory belongs to another environment, or does not reach its goal.
         RunFolderError: the folder exists, is in use, or cannot be written.
         CallbackFailed: the environment raised, or returned NaN.
         TrainingStalled: the budget ended first; its `result` holds what was learnt so far.
     """
     config = _config(options)
-    model = open_model(env, env_kwargs)
+    model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
     if trajectory is not None:
         if config.chooses_planner:
             raise InvalidOption("a trajectory is given, so nothing is planned; remove planner and planner_kwargs")
@@ -71,16 +76,16 @@ def resume(folder: str | Path, *, max_transitions: int | None = None,
             raise RunFolderError(f"the training in {opened.path} has ended; there is nothing to resume")
         values = read_toml(opened.path / CONFIG) | ({"max_transitions": max_transitions} if max_transitions else {})
         try:
-            others = {name: values[name] for name in values.keys() - {"env", "env_kwargs", "versions"}}
-            env, env_kwargs, config = values["env"], values.get("env_kwargs", {}), TrainConfig(**others)
+            others = {name: values[name] for name in values.keys() - {"kind", "environment", "versions"}}
+            environment, config = EnvSpec.from_dict(values["environment"]), TrainConfig(**others)
         except (KeyError, TypeError) as error:
             raise DamagedFile(f"{opened.path / CONFIG} is not the configuration of a training: {error}") from error
         if max_transitions:
             opened.write_config(values)
-        return _checked(Training(make(env, env_kwargs), config, opened, on_progress, True).run(None))
+        return _checked(Training(make(environment), config, opened, on_progress, True).run(None))
 
 
-def _check_planner(model: ResetAnywhere, config: TrainConfig) -> None:
+def _check_planner(model: ResettableModel, config: TrainConfig) -> None:
     """Build the planner once, so that what it refuses is refused before a folder is made."""
     with quiet_ompl(), make_problem(model, seed=config.seed, counter=Counter()) as problem:
         PlannerSpec(config.planner, config.planner_kwargs).build(problem.space_information, config.seed)

@@ -13,9 +13,10 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.bridge.stopping import interruptible
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.bridge.versions import planning_versions
-from pbcs_ompl.core.contracts import Counter, ProgressCallback, ResetAnywhere
 from pbcs_ompl.core.errors import CallbackFailed, Mismatch, PbcsError
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.results.folder import RunFolder, read_json, write_json
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.checkpoint import read_checkpoint, write_checkpoint
@@ -43,7 +44,7 @@ class Training:
         resumed: Go on from what the folder holds.
     """
 
-    def __init__(self, model: ResetAnywhere, config: TrainConfig, folder: RunFolder | None,
+    def __init__(self, model: ResettableModel, config: TrainConfig, folder: RunFolder | None,
                  on_progress: ProgressCallback | None, resumed: bool):
         self.model, self.config, self.on_progress = model, config, on_progress
         self.folder = folder
@@ -71,9 +72,10 @@ class Training:
         config = self.config
         if self.folder and not self.resumed:
             self.folder.write_config({
-                "env": self.model.env_id, "method": config.method, "planner": config.planner, "agent": config.agent,
+                "kind": "train", "method": config.method, "planner": config.planner, "agent": config.agent,
                 "preset": config.preset, "seed": config.seed, "max_transitions": config.max_transitions,
-                "device": config.device, "env_kwargs": self.model.env_kwargs, "planner_kwargs": config.planner_kwargs,
+                "device": config.device, "environment": self.model.spec.to_dict(),
+                "planner_kwargs": config.planner_kwargs,
                 "settings": config.settings, "agent_settings": config.agent_settings,
                 "versions": planning_versions() | {"torch": version("torch")}})
 

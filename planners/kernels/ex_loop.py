@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numba import njit, types
 
-from pbcs_ompl.core.contracts import Array, IndexArray
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.compiled import STEP_TYPE
 from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, make_room_and_add
 from pbcs_ompl.planners.kernels.prefetch import prefetch

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pbcs_ompl.core.contracts import Array, IndexArray
+from pbcs_ompl.core.types import Array, IndexArray
 
 Items = NDArray[np.int32]
 LEAF = 32

@@ -13,7 +13,7 @@ import gymnasium
 import numpy as np
 
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.core.contracts import Array, Transition
+from pbcs_ompl.core.types import Array, Transition
 from pbcs_ompl.planners import Ex
 from pbcs_ompl.resettable import make
 

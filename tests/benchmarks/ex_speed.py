@@ -28,9 +28,9 @@ from ompl import util as ou
 
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.bridge.problem import make_problem
-from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import PlannerUnavailable
 from pbcs_ompl.core.registry import load
+from pbcs_ompl.core.types import Counter
 from pbcs_ompl.envs.maze.layout import MazeLayout
 from pbcs_ompl.planners import Ex
 from pbcs_ompl.resettable import make

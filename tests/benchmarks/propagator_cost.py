@@ -15,7 +15,7 @@ from ompl import control as oc
 from pbcs_ompl.bridge.layout import blocks, state_writer
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.bridge.problem import make_problem
-from pbcs_ompl.core.contracts import Counter
+from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
 
 CALLS = 50_000

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pbcs_ompl.core.contracts import Array, BoolArray, Transition
+from pbcs_ompl.core.types import Array, BoolArray, Transition
 
 
 class Square:

@@ -23,7 +23,7 @@ from pbcs_ompl.core.errors import (
     CallbackFailed,
     InvalidOption,
     InvalidState,
-    NoResetAnywhere,
+    NotResettable,
     PbcsError,
     RunFolderError,
     UnknownName,
@@ -180,7 +180,7 @@ def test_environment_is_given_in_three_ways(env):
     ({"env_kwargs": {"size": 0}}, InvalidOption, "size"),
     ({"env_kwargs": {"sise": 3}}, InvalidOption, "did you mean 'size'"),
     ({"env": "pbcs/Mase-v0"}, UnknownName, "did you mean 'pbcs/Maze-v0'"),
-    ({"env": 3}, NoResetAnywhere, "expected a gymnasium.Env"),
+    ({"env": 3}, NotResettable, "expected a gymnasium.Env"),
 ])
 def test_mistakes_are_named_and_leave_nothing_behind(tmp_path, arguments, error, message):
     with pytest.raises(error, match=message):

@@ -13,8 +13,8 @@ from pbcs_ompl.bridge.layout import blocks, state_reader, state_writer
 from pbcs_ompl.bridge.path import to_trajectory
 from pbcs_ompl.bridge.problem import make_problem, quiet_ompl
 from pbcs_ompl.bridge.stopping import make_stop
-from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import CallbackFailed, InvalidState, UnsupportedSpace
+from pbcs_ompl.core.types import Counter
 
 
 def propagate(problem, state, control, steps=1, alias=False):

@@ -9,7 +9,7 @@ from ompl import base as ob
 from pbcs_ompl.bridge.layout import blocks, state_reader, state_writer
 from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.bridge.spaces import make_state_space
-from pbcs_ompl.core.contracts import Counter
+from pbcs_ompl.core.types import Counter
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=8).filter(any))

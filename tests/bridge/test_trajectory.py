@@ -12,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 from pbcs_ompl.bridge.path import to_path, to_trajectory
 from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import DamagedFile, Mismatch
+from pbcs_ompl.core.types import Counter
 
 
 def walk(model, steps=12, seed=0):
@@ -23,7 +23,7 @@ def walk(model, steps=12, seed=0):
     for action in actions:
         states.append(model.transition(states[-1][None], action[None]).states[0])
     rewards = model.transition(np.array(states[:-1]), actions).rewards
-    return Trajectory(model.env_id, model.env_kwargs, np.array(states), actions, rewards, "walk", seed)
+    return Trajectory(model.spec.id, model.spec.kwargs, np.array(states), actions, rewards, "walk", seed)
 
 
 @settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])

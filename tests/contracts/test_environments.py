@@ -10,8 +10,8 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
-from pbcs_ompl.core.contracts import ResetAnywhere
 from pbcs_ompl.core.errors import MissingDependency
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.registry import load_environments
 from pbcs_ompl.core.rendering import check_can_render
 from pbcs_ompl.resettable import check_resettable, make
@@ -39,7 +39,7 @@ def can_render() -> bool:
     return True
 
 
-def rolled(model: ResetAnywhere, seed: int, count: int = 40) -> np.ndarray:
+def rolled(model: ResettableModel, seed: int, count: int = 40) -> np.ndarray:
     """Return states that a few random episodes visit."""
     rng = np.random.default_rng(seed)
     states = np.tile(model.initial_state(seed), (4, 1))
@@ -98,8 +98,8 @@ def test_the_model_is_complete_and_consistent(env_id: str) -> None:
     for bounds in (model.state_low, model.state_high, model.action_low, model.action_high):
         assert np.isfinite(bounds).all()
     assert model.max_episode_steps > 0
-    json.dumps(model.env_kwargs)
-    again = make(model.env_id, model.env_kwargs)
+    json.dumps(model.spec.kwargs)
+    again = make(model.spec)
     np.testing.assert_array_equal(rolled(again, 1), states)
 
 

@@ -7,8 +7,9 @@ from ompl import control as oc
 
 from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.core import registry
-from pbcs_ompl.core.contracts import BatchPlanner, Counter, PlannerFactory
 from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable
+from pbcs_ompl.core.interfaces import BatchPlanner, PlannerFactory
+from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
 
 BUDGET = 60_000

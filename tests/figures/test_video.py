@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.cli import main
-from pbcs_ompl.core.errors import InvalidOption, MissingDependency, NoResetAnywhere
+from pbcs_ompl.core.errors import InvalidOption, MissingDependency, NotResettable
 from pbcs_ompl.core.rendering import check_can_render, prefer_headless_rendering
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
@@ -56,7 +56,7 @@ def test_what_is_not_installed_is_named(tmp_path: Path, monkeypatch: pytest.Monk
 def test_an_environment_that_cannot_render(tmp_path: Path) -> None:
     pytest.importorskip("imageio_ffmpeg")
     model = make("pbcs/Toy1D-v0")
-    with pytest.raises((InvalidOption, NoResetAnywhere)):
+    with pytest.raises((InvalidOption, NotResettable)):
         write_video(model, np.array([[0.5]]), tmp_path / "film.mp4")
     assert list(tmp_path.iterdir()) == []
 

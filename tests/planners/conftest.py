@@ -8,7 +8,7 @@ from numba import njit
 from ompl import base as ob
 from ompl import control as oc
 
-from pbcs_ompl.core.contracts import Counter, Transition
+from pbcs_ompl.core.types import Counter, Transition
 
 
 @njit("Tuple((f8, b1, b1))(f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, f8[:, ::1], i8)")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from ompl import base as ob
 
-from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, Mismatch
+from pbcs_ompl.core.types import Counter
 from pbcs_ompl.planners import RRTNH, ESTAdapted, Ex, RandomWalk, RRTSteered, Strategy, Tree
 
 OURS = [Ex, RRTNH, RRTSteered, ESTAdapted, RandomWalk]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.core.errors import InvalidState, NoResetAnywhere
+from pbcs_ompl.core.errors import InvalidState, NotResettable
 from pbcs_ompl.resettable import adapt, check_resettable, make
 from pbcs_ompl.resettable.adapters.classic import AttributeEnv
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel
@@ -120,7 +120,7 @@ def test_actions_are_replayed_where_copies_are_not_faithful(kind: type[Slider]) 
 
 
 def test_random_steps_are_refused() -> None:
-    with pytest.raises(NoResetAnywhere, match="steps are random"):
+    with pytest.raises(NotResettable, match="steps are random"):
         adapt(Dice())
 
 
@@ -180,5 +180,5 @@ class _Stepping(np.random.Generator):
 
 def test_a_model_without_rules_has_plain_options() -> None:
     model = make("Pendulum-v1")
-    assert model.env_kwargs == {}
+    assert model.spec.kwargs == {}
     assert isinstance(model, GetSetStateModel)

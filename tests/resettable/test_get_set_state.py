@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from pbcs_ompl.core.errors import InvalidOption, InvalidState, NoResetAnywhere
+from pbcs_ompl.core.errors import InvalidOption, InvalidState, NotResettable
 from pbcs_ompl.resettable import adapt, check_resettable
 
 
@@ -45,7 +45,7 @@ class Cart(gymnasium.Env):
 def test_a_cart_is_a_model() -> None:
     model = adapt(Cart())
     assert model.capabilities == {"visited", "arbitrary", "exact"}
-    assert model.env_id == "Cart"
+    assert model.spec.id == "Cart"
     assert model.feature_dims == (0,)
     np.testing.assert_array_equal(model.bin_size, [0.5])
     states = np.array([[0.0, 0.5], [-1.0, 0.0]])
@@ -112,7 +112,7 @@ def test_the_observation_serves_as_state_and_gives_the_bounds() -> None:
     ({"goal_distance": lambda self, states: states[:, 0]}, "no `goal_threshold`"),
 ])
 def test_incomplete_environments(members: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(NoResetAnywhere, match=complaint):
+    with pytest.raises(NotResettable, match=complaint):
         adapt(type("Incomplete", (Cart,), members)())
 
 

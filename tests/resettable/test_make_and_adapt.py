@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from gymnasium import spaces, wrappers
 
-from pbcs_ompl.core.contracts import VectorisedEnv
 from pbcs_ompl.core.errors import (
     InvalidOption,
     InvalidState,
     MissingDependency,
-    NoResetAnywhere,
+    NotResettable,
     UnknownName,
     UnsupportedSpace,
 )
+from pbcs_ompl.core.interfaces import VectorisedEnv
 from pbcs_ompl.resettable import adapt, make
 
 
@@ -37,7 +37,7 @@ def test_a_module_that_does_not_exist() -> None:
 
 def test_an_id_with_its_module_can_be_made_again() -> None:
     model = make("pbcs_ompl.envs:pbcs/Maze-v0", {"size": 3})
-    assert make(model.env_id, model.env_kwargs).env_id == "pbcs_ompl.envs:pbcs/Maze-v0"
+    assert make(model.spec).env_id == "pbcs_ompl.envs:pbcs/Maze-v0"
 
 
 @pytest.mark.parametrize(("kwargs", "error", "complaint"), [
@@ -53,7 +53,7 @@ def test_wrong_options(kwargs: dict[str, object], error: type[Exception], compla
 
 def test_the_model_says_how_to_make_it_again() -> None:
     model = make("pbcs/Maze-v0", {"size": 5, "maze_seed": 2, "render_mode": "rgb_array"})
-    assert (model.env_id, model.env_kwargs) == ("pbcs/Maze-v0", {"size": 5, "maze_seed": 2})
+    assert (model.spec.id, model.spec.kwargs) == ("pbcs/Maze-v0", {"size": 5, "maze_seed": 2})
     assert model.max_episode_steps == 500
     assert model.capabilities == {"visited", "arbitrary", "exact"}
 
@@ -64,10 +64,10 @@ def test_a_model_is_adapted_already() -> None:
 
 
 @pytest.mark.parametrize(("thing", "complaint"), [
-    ("pbcs/Maze-v0", "call make"), (3, "expected a gymnasium.Env or a ResetAnywhere, got int"),
+    ("pbcs/Maze-v0", "call make"), (3, "expected a gymnasium.Env or a ResettableModel, got int"),
 ])
 def test_what_is_no_environment(thing: object, complaint: str) -> None:
-    with pytest.raises(NoResetAnywhere, match=complaint):
+    with pytest.raises(NotResettable, match=complaint):
         adapt(thing)
 
 
@@ -77,7 +77,7 @@ def test_an_incomplete_model_names_what_it_lacks() -> None:
 
         def transition(self) -> None: ...
 
-    with pytest.raises(NoResetAnywhere, match=r"Half is no ResetAnywhere; it lacks action_high, .*walls"):
+    with pytest.raises(NotResettable, match=r"Half is no ResettableModel; it lacks action_high, .*walls"):
         adapt(Half())
 
 
@@ -138,15 +138,15 @@ def test_wrappers_of_limits_and_rewards_are_taken_off() -> None:
     lambda env: wrappers.DelayObservation(env, 2),
 ])
 def test_wrappers_with_a_memory_are_refused(wrap: object) -> None:
-    with pytest.raises(NoResetAnywhere, match=r"memory or noise.*leave it out"):
+    with pytest.raises(NotResettable, match=r"memory or noise.*leave it out"):
         adapt(wrap(gymnasium.make("pbcs/Maze-v0")))  # type: ignore[operator]
 
 
 def test_other_wrappers_are_refused_with_a_remedy() -> None:
     env = wrappers.RescaleAction(gymnasium.make("pbcs/Maze-v0"), -1.0, 1.0)
-    with pytest.raises(NoResetAnywhere, match=r"RescaleAction.*pass env\.unwrapped"):
+    with pytest.raises(NotResettable, match=r"RescaleAction.*pass env\.unwrapped"):
         adapt(env)
-    assert adapt(env.unwrapped).env_id == "pbcs/Maze-v0"
+    assert adapt(env.unwrapped).spec.id == "pbcs/Maze-v0"
 
 
 def test_the_protocol_is_what_the_mazes_offer() -> None:

@@ -43,7 +43,7 @@ def test_it_can_be_reset_anywhere(model: Any) -> None:
 
 
 def test_physics_is_that_of_the_environment_itself(model: Any) -> None:
-    raw: Any = gymnasium.make(model.env_id).unwrapped
+    raw: Any = gymnasium.make(model.spec.id).unwrapped
     raw.reset(seed=3)
     state = model.initial_state(3)
     rng = np.random.default_rng(0)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
+from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.ball import uniform_in_ball
 

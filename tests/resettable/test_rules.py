@@ -90,9 +90,9 @@ def test_what_the_environment_reports() -> None:
 
 def test_functions_are_rules() -> None:
     model = make("Pendulum-v1", goal=upright, feature=height)
-    assert model.env_kwargs == {"--goal": f"{__name__}:upright", "--feature": f"{__name__}:height"}
+    assert model.spec.kwargs == {"--goal": f"{__name__}:upright", "--feature": f"{__name__}:height"}
     assert model.feature_low.shape == (1,)
-    again = make(model.env_id, model.env_kwargs)
+    again = make(model.spec)
     np.testing.assert_array_equal(again.initial_state(3), model.initial_state(3))
 
 

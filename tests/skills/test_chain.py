@@ -29,7 +29,7 @@ def round_the_corner():
     goals = [Ball(np.array(ENDS[0]), 0.15), Ball(np.array(ENDS[1]), 0.15), Target(MODEL.goal_threshold)]
     skills = tuple(Skill(towards(end), Ball(np.array(start), 0.15), goal)
                    for start, end, goal in zip(TURNS, ENDS, goals, strict=True))
-    return SkillChain(skills, np.array(TURNS[0]), MODEL.env_id, MODEL.env_kwargs, 200)
+    return SkillChain(skills, np.array(TURNS[0]), MODEL.spec, 200)
 
 
 def test_the_chain_walks_round_the_corners():

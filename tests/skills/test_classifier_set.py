@@ -81,7 +81,7 @@ def test_a_chain_with_a_learnt_set_survives_a_file(tmp_path):
     actor = Policy(((np.eye(2, dtype=np.float32), np.zeros(2, np.float32)),), MODEL.action_low, MODEL.action_high)
     policy = SkillPolicy(actor, Frame.plain(2))
     skills = (Skill(policy, GOAL, learnt()), Skill(policy, learnt(), Target(0.2)))
-    SkillChain(skills, CENTER, MODEL.env_id, MODEL.env_kwargs, 50).save(tmp_path)
+    SkillChain(skills, CENTER, MODEL.spec, 50).save(tmp_path)
     loaded = SkillChain.load(tmp_path)
     assert [kind_of(skill.activation) for skill in loaded.skills] == ["ball", "classifier"]
     assert [kind_of(skill.goal) for skill in loaded.skills] == ["classifier", "target"]

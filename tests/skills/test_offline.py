@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pbcs_ompl.core.contracts import Counter
 from pbcs_ompl.core.errors import InvalidOption, TrainingStalled
+from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
 from pbcs_ompl.skills import train
 from pbcs_ompl.skills.config import TrainConfig

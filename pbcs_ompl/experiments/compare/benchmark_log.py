@@ -8,9 +8,10 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+from pbcs_ompl.core.plain import plain
 from pbcs_ompl.experiments.compare.run import Record, folder_of
 from pbcs_ompl.experiments.compare.sweep import Sweep
-from pbcs_ompl.results.folder import plain, write_text
+from pbcs_ompl.results.folder import write_text
 from pbcs_ompl.results.provenance import provenance
 
 STATUS = ("Unknown status", "Invalid start", "Invalid goal", "Unrecognized goal type", "Timeout",

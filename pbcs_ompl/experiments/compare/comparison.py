@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.experiments.compare.paired import holm, sign_tests
 from pbcs_ompl.experiments.compare.records import read_records
 from pbcs_ompl.experiments.compare.run import Record, folder_of
 from pbcs_ompl.experiments.compare.statistics import row
-from pbcs_ompl.experiments.compare.sweep import Environment, Sweep
+from pbcs_ompl.experiments.compare.sweep import Sweep
 from pbcs_ompl.results.folder import CONFIG, read_toml
 
 DATABASE = "comparison.db"
@@ -37,7 +38,7 @@ class Comparison:
         """Return the records of each planner in each environment, by their names, in order."""
         grouped: dict[str, dict[str, list[Record]]] = {}
         for record in self.runs:
-            label = Environment(record["env"], record["env_kwargs"]).label
+            label = EnvSpec.from_dict(record["environment"]).label
             grouped.setdefault(label, {}).setdefault(record["planner"], []).append(record)
         return grouped
 

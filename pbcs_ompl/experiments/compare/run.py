@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from pbcs_ompl.bridge.coverage import Coverage
 from pbcs_ompl.bridge.plan import plan
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import PbcsError
 
 Record = dict[str, Any]
@@ -16,7 +17,7 @@ MEASURED = ("transitions", "collision_checks", "seconds", "nodes", "path_length"
 """What a record has beside its job; None in a run that did not come to an end."""
 WARM_UP_TRANSITIONS = 64
 WARM_UP_SECONDS = 1.0
-_warm: set[tuple[str, str, str]] = set()
+_warm: set[tuple[str, str]] = set()
 
 
 class Job(NamedTuple):
@@ -26,8 +27,7 @@ class Job(NamedTuple):
     """Its name in the comparison, and the path of its record without the ending."""
     planner: str
     seed: int
-    env: str
-    env_kwargs: dict[str, Any]
+    environment: EnvSpec
     planner_kwargs: dict[str, Any]
     max_transitions: int
     max_seconds: float | None
@@ -43,7 +43,7 @@ def run(job: Job) -> Record:
     try:
         _warm_up(job)
         _forget_peak_of_memory()
-        result = plan(job.env, job.planner, env_kwargs=job.env_kwargs, planner_kwargs=job.planner_kwargs,
+        result = plan(job.environment, job.planner, planner_kwargs=job.planner_kwargs,
                       seed=job.seed, max_transitions=job.max_transitions, max_seconds=job.max_seconds, coverage=True)
     except PbcsError as error:
         return broken(job, str(error))
@@ -64,7 +64,8 @@ def folder_of(record: Record) -> str:
 
 
 def _identity(job: Job) -> Record:
-    return {"name": job.name, "planner": job.planner, "seed": job.seed, "env": job.env, "env_kwargs": job.env_kwargs}
+    return {"name": job.name, "planner": job.planner, "seed": job.seed,
+            "environment": job.environment.to_dict()}
 
 
 def _coverage(coverage: Coverage | None) -> Record:
@@ -77,9 +78,9 @@ def _coverage(coverage: Coverage | None) -> Record:
 
 
 def _warm_up(job: Job) -> None:
-    key = (job.planner, job.env, repr(job.env_kwargs))
+    key = (job.planner, job.environment.label)
     if key not in _warm:
-        plan(job.env, job.planner, env_kwargs=job.env_kwargs, planner_kwargs=job.planner_kwargs, coverage=True,
+        plan(job.environment, job.planner, planner_kwargs=job.planner_kwargs, coverage=True,
              max_transitions=min(WARM_UP_TRANSITIONS, job.max_transitions), max_seconds=WARM_UP_SECONDS)
         _warm.add(key)
 

@@ -6,14 +6,15 @@ from pathlib import Path
 
 from pbcs_ompl.bridge.building import PlannerSpec
 from pbcs_ompl.bridge.problem import make_problem, quiet_ompl
-from pbcs_ompl.core.contracts import Counter, ProgressCallback
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import MissingDependency, PlannerUnavailable
+from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.experiments.compare.benchmark_log import write_logs
 from pbcs_ompl.experiments.compare.comparison import DATABASE, Comparison, merge
 from pbcs_ompl.experiments.compare.database import write_database
 from pbcs_ompl.experiments.compare.records import read_records, record_file
 from pbcs_ompl.experiments.compare.run import Job, Record, broken, run
-from pbcs_ompl.experiments.compare.sweep import Options, Sweep, make_sweep
+from pbcs_ompl.experiments.compare.sweep import Options, Sweep, make_sweep, pair_environments
 from pbcs_ompl.experiments.compare.tally import Tally
 from pbcs_ompl.experiments.workers import Executor, check_resources, run_all
 from pbcs_ompl.resettable import make
@@ -23,8 +24,9 @@ SECONDS_OF_GRACE = 20.0
 """A run may take so much longer than its budget of seconds, to build, warm up and replay, before it is killed."""
 
 
-def compare(planners: Sequence[str] | Mapping[str, Options], env: str | Sequence[str], *,
-            env_kwargs: Options | Sequence[Options] | None = None, seeds: int | Sequence[int] = 10,
+def compare(planners: Sequence[str] | Mapping[str, Options], env: str | EnvSpec | Sequence[str | EnvSpec], *,
+            env_kwargs: Options | Sequence[Options] | None = None, goal: str | None = None,
+            feature: str | None = None, start_seed: int | None = None, seeds: int | Sequence[int] = 10,
             max_transitions: int = 1_000_000, max_seconds: float | None = None, max_memory: float | None = None,
             jobs: int | Executor = 1, out: str | Path | None = None,
             on_progress: ProgressCallback | None = None) -> Comparison:
@@ -37,7 +39,8 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: str | Sequence
     Args:
         planners: Registered names or `module:attribute`, which other processes have to find; or their options by name.
         env, env_kwargs: Environments by their Gymnasium ids, and their options: as many of one as of the other, or one
-            of either for all of the other.
+            of either for all of the other. An `EnvSpec` has its options already.
+        goal, feature, start_seed: Rules of all environments; see `pbcs_ompl.make`.
         seeds: How many seeds (0, 1, ...), or the seeds.
         max_transitions, max_seconds: The budget of one run. Planners see to it; one that is still at work 20 seconds
             after `max_seconds` is killed.
@@ -49,12 +52,12 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: str | Sequence
         on_progress: Called when a run ends with {"runs", "solved", "table": what is known of each planner}.
 
     Raises:
-        UnknownName, InvalidOption, NoResetAnywhere, UnsupportedSpace: wrong input.
+        UnknownName, InvalidOption, NotResettable, UnsupportedSpace: wrong input.
         RunFolderError: `out` holds something else, is in use, or cannot be written.
         DamagedFile: a record in `out` is damaged.
     """
-    sweep = make_sweep(planners, env, {} if env_kwargs is None else env_kwargs, seeds, max_transitions, max_seconds,
-                       max_memory)
+    environments = pair_environments(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
+    sweep = make_sweep(planners, environments, seeds, max_transitions, max_seconds, max_memory)
     check_resources(jobs)
     unavailable = _unavailable(sweep)
     folder = None if out is None else Path(out)
@@ -91,7 +94,7 @@ def _unavailable(sweep: Sweep) -> dict[str, str]:
         try:
             spec = PlannerSpec(planner, options)
             if options:  # some planners look at them only now
-                with make_problem(make(*sweep.environments[0]), counter=Counter(1)) as problem, quiet_ompl():
+                with make_problem(make(sweep.environments[0]), counter=Counter(1)) as problem, quiet_ompl():
                     spec.build(problem.space_information, 0)
         except (PlannerUnavailable, MissingDependency) as error:
             reasons[planner] = str(error)

@@ -5,7 +5,7 @@ from itertools import product
 from statistics import median
 from typing import Any
 
-from pbcs_ompl.core.contracts import ProgressCallback
+from pbcs_ompl.core.types import ProgressCallback
 from pbcs_ompl.experiments.compare.run import Record, folder_of
 from pbcs_ompl.experiments.compare.statistics import censored
 from pbcs_ompl.experiments.compare.sweep import Sweep

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pbcs_ompl.core.contracts import ProgressCallback
 from pbcs_ompl.core.errors import InvalidOption, PbcsError
+from pbcs_ompl.core.types import ProgressCallback
 from pbcs_ompl.experiments.study.claims import Claim
 from pbcs_ompl.experiments.study.runs import Made, make_runs, run_settings
 from pbcs_ompl.experiments.study.study import Record, Study
@@ -96,7 +96,7 @@ def run_shard(study: Study, shard: Shard, *, out: str | Path, seeds: int | None 
 
 def open_study(study: Study, out: str | Path, seeds: int | None = None, *, part: str = "") -> RunFolder:
     """Open the folder for the results of a study, new or begun; see `open_run`."""
-    config = {"study": study.id, "folder": study.folder, "seeds": _seeds(study, seeds), **study.sweep}
+    config = {"kind": "study", "study": study.id, "folder": study.folder, "seeds": _seeds(study, seeds), **study.sweep}
     return open_run(Path(out), config, may_change=("folder", "seeds"), part=part)
 
 

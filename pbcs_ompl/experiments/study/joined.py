@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 
 
 def chunks(seeds: int, size: int) -> Iterator[list[int]]:

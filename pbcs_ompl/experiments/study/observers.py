@@ -4,14 +4,15 @@ import numpy as np
 
 from pbcs_ompl import diagnostics
 from pbcs_ompl.agents.stacked_agent import StackedAgent
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
 from pbcs_ompl.core.errors import InvalidState
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.experiments.study.stacked_training import Observer
 
 ROUNDS = 100
 
 
-def sample_states(model: ResetAnywhere, count: int, seed: int = 0) -> Array:
+def sample_states(model: ResettableModel, count: int, seed: int = 0) -> Array:
     """Return valid states [count, D], uniform within the bounds but for the goal.
 
     Raises:
@@ -24,7 +25,7 @@ def sample_states(model: ResetAnywhere, count: int, seed: int = 0) -> Array:
         found = np.concatenate([found, drawn[good]])
         if len(found) >= count:
             return found[:count]
-    raise InvalidState(f"{model.env_id}: {len(found)} valid states in {ROUNDS * count} draws, expected {count}")
+    raise InvalidState(f"{model.spec.id}: {len(found)} valid states in {ROUNDS * count} draws, expected {count}")
 
 
 class Probe:
@@ -34,7 +35,7 @@ class Probe:
         count: How many states, each with one action.
     """
 
-    def __init__(self, model: ResetAnywhere, count: int = 50):
+    def __init__(self, model: ResettableModel, count: int = 50):
         self.model, self.low, self.high = model, model.action_low, model.action_high
         self.states = sample_states(model, count)
         self.actions = np.random.default_rng(1).uniform(self.low, self.high, (count, len(self.low)))

@@ -10,8 +10,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import Array
 
 Polynomial = list[Fraction]
 """Coefficients, lowest first, in the place u in [0, 1) within a piece."""

@@ -6,11 +6,12 @@ from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
-from pbcs_ompl.core.contracts import ProgressCallback
 from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.plain import plain
+from pbcs_ompl.core.types import ProgressCallback
 from pbcs_ompl.experiments.study.study import Record, Settings, Study, find_study
 from pbcs_ompl.experiments.workers import Executor, read_record, run_all
-from pbcs_ompl.results.folder import plain, write_json
+from pbcs_ompl.results.folder import write_json
 
 RUNS = "runs"
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from pbcs_ompl.agents.noise import Noise, draw_all
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.agents.update import one_thread
-from pbcs_ompl.core.contracts import Array, BoolArray, IndexArray, ResetAnywhere
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 
 NEVER = -1
 Observer = Callable[[StackedAgent], Array]
@@ -108,7 +109,7 @@ class StackedTraining:
     whose episodes differ in length train together; the policy is the same for all steps of a block.
     """
 
-    def __init__(self, model: ResetAnywhere, agent: StackedAgent, noise: Noise, settings: LoopSettings, *,
+    def __init__(self, model: ResettableModel, agent: StackedAgent, noise: Noise, settings: LoopSettings, *,
                  expert: Callable[[Array], Array] | None = None, observers: Mapping[str, Observer] | None = None):
         self.model, self.agent, self.noise, self.settings = model, agent, noise, settings
         self.expert, self.observers = expert, dict(observers or {})
@@ -215,7 +216,7 @@ class StackedTraining:
         return values.reshape(len(self.active), self.settings.copies, -1)
 
 
-def solved(model: ResetAnywhere, agent: StackedAgent, starts: Array, max_steps: int) -> BoolArray:
+def solved(model: ResettableModel, agent: StackedAgent, starts: Array, max_steps: int) -> BoolArray:
     """Return whether each agent, without noise, comes from its start [S, D] to the goal within `max_steps` [S]."""
     states = starts.copy()
     success = np.zeros(len(starts), dtype=np.bool_)

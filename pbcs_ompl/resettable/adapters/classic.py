@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array
 from pbcs_ompl.core.errors import InvalidState
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.rules import FeatureRule, feature_rule
 

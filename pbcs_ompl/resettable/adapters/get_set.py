@@ -6,8 +6,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray, Capability, Transition
-from pbcs_ompl.core.errors import InvalidOption, InvalidState, NoResetAnywhere
+from pbcs_ompl.core.errors import InvalidOption, InvalidState, NotResettable
+from pbcs_ompl.core.types import Array, BoolArray, Capability, Transition
 from pbcs_ompl.resettable.model import Model
 
 Step = tuple[Array, float, bool, bool]
@@ -34,7 +34,7 @@ class GetSetStateModel(Model):
       step of this model succeeded, and 1 for all others.
 
     Raises:
-        NoResetAnywhere: the state is no vector, or bounds or observations are missing.
+        NotResettable: the state is no vector, or bounds or observations are missing.
     """
 
     def __init__(self, env: Any):
@@ -44,26 +44,21 @@ class GetSetStateModel(Model):
         low, high, declared = _state_bounds(env, state, is_observation)
         super().__init__(env, low, high)
         if len(self.state_low) != len(state):
-            raise NoResetAnywhere(f"{self.env_id}: state_low has {len(self.state_low)} dimensions, "
+            raise NotResettable(f"{self.spec.id}: state_low has {len(self.state_low)} dimensions, "
                                   f"the state has {len(state)}")
         arbitrary: set[Capability] = {"arbitrary"} if declared else set()
         usual: frozenset[Capability] = frozenset({"visited", "exact", *arbitrary})
         self.capabilities: frozenset[Capability] = getattr(env, "capabilities", usual)
         self._observe: Callable[[Array], Array] | None = getattr(env, "observe", None)
         if self._observe is None and not is_observation:
-            raise NoResetAnywhere(f"{self.env_id}: the observation is not the state, so implement "
+            raise NotResettable(f"{self.spec.id}: the observation is not the state, so implement "
                                   f"`observe(states [B, D]) -> observations [B, O]`")
         self._goal_distance: Callable[[Array], Array] | None = getattr(env, "goal_distance", None)
         if self._goal_distance is not None and not hasattr(env, "goal_threshold"):
-            raise NoResetAnywhere(f"{self.env_id}: it has `goal_distance` but no `goal_threshold`; set both")
+            raise NotResettable(f"{self.spec.id}: it has `goal_distance` but no `goal_threshold`; set both")
         self.goal_threshold = 0.5 if self._goal_distance is None else float(env.goal_threshold)
         self._is_valid: Callable[[Array], BoolArray] | None = getattr(env, "is_valid", None)
         self._reached: set[bytes] = set()
-
-    def initial_state(self, seed: int | None = None) -> Array:
-        """Return the state [D] after `env.reset(seed=seed)`."""
-        self.env.reset(seed=seed)
-        return _as_vector(self.env, self.env.get_env_state())
 
     def transition(self, states: Array, controls: Array) -> Transition:
         """Advance states [B, D] by one step under controls [B, A], one after the other.
@@ -126,7 +121,7 @@ class GetSetStateModel(Model):
 
 def _as_vector(env: Any, state: Any) -> Array:
     if not isinstance(state, np.ndarray | list | tuple) or np.ndim(state) != 1:
-        raise NoResetAnywhere(f"{type(env).__name__}.get_env_state() returned a {type(state).__name__}; "
+        raise NotResettable(f"{type(env).__name__}.get_env_state() returned a {type(state).__name__}; "
                               f"expected a vector of numbers")
     return np.array(state, dtype=np.float64)
 
@@ -138,7 +133,7 @@ def _state_bounds(env: Any, state: Array, is_observation: bool) -> tuple[Array, 
     box = env.observation_space
     if is_observation and np.isfinite(box.low).all() and np.isfinite(box.high).all():
         return box.low, box.high, False
-    raise NoResetAnywhere(f"{type(env).__name__}: the bounds of its {len(state)} state dimensions are "
+    raise NotResettable(f"{type(env).__name__}: the bounds of its {len(state)} state dimensions are "
                           f"unknown; set `state_low` and `state_high`")
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, IndexArray
-from pbcs_ompl.core.errors import InvalidState, MissingDependency, NoResetAnywhere
+from pbcs_ompl.core.errors import InvalidState, MissingDependency, NotResettable
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel, Step
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.maze_map import has_map, map_bounds, wall_rectangles
@@ -203,12 +203,12 @@ def check_observes(env: Any) -> None:
 
     Raises:
         MissingDependency: mujoco is not installed.
-        NoResetAnywhere: there is no `_get_obs`.
+        NotResettable: there is no `_get_obs`.
     """
     try:
         import mujoco  # noqa: F401
     except ModuleNotFoundError as error:
         raise MissingDependency("this environment needs mujoco: pip install 'pbcs-ompl[mujoco]'") from error
     if not callable(getattr(env, "_get_obs", None)):
-        raise NoResetAnywhere(f"{type(env).__name__} has no `_get_obs()`, so a restored state cannot be observed; "
+        raise NotResettable(f"{type(env).__name__} has no `_get_obs()`, so a restored state cannot be observed; "
                               f"add it, or get_env_state and set_env_state")

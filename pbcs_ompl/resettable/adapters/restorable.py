@@ -8,8 +8,8 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from pbcs_ompl.core.contracts import Array, Capability
 from pbcs_ompl.core.errors import CallbackFailed
+from pbcs_ompl.core.types import Array, Capability
 from pbcs_ompl.resettable.explore import feature_bounds
 from pbcs_ompl.resettable.rules import (
     FeatureRule,

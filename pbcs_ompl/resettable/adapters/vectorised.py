@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array, BoolArray, Capability, Transition
+from pbcs_ompl.core.types import Array, BoolArray, Capability, Transition
 from pbcs_ompl.resettable.model import Model
 
 
 class VectorisedModel(Model):
-    """A `VectorisedEnv` as a `ResetAnywhere`: its own methods, bound directly, beside `Model`'s.
+    """A `VectorisedEnv` as a `ResettableModel`: its own methods, bound directly, beside `Model`'s.
 
     `step_one` is the environment's, if it has one: then nothing is checked in it, and NaN gives NaN.
     """
@@ -25,11 +25,6 @@ class VectorisedModel(Model):
         self.goal_distance: Callable[[Array], Array] = env.goal_distance
         self.step_one: Callable[[list[float], list[float]], list[float]] = getattr(
             env, "step_one", self._step_one_by_transition)
-
-    def initial_state(self, seed: int | None = None) -> Array:
-        """Return the state [D] after `env.reset(seed=seed)`."""
-        self.env.reset(seed=seed)
-        return np.array(self.env.get_env_state(), dtype=np.float64)
 
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, D] the environment can be in [B]."""

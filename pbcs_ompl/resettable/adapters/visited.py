@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.contracts import Array
-from pbcs_ompl.core.errors import InvalidState, NoResetAnywhere
+from pbcs_ompl.core.errors import InvalidState, NotResettable
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv, flat
 
 FIRST_HASH = float(2**32)
@@ -149,7 +149,7 @@ def check_replays(env: Any) -> None:
     """Refuse an environment in which the same actions from the same seed lead elsewhere.
 
     Raises:
-        NoResetAnywhere: its steps are random.
+        NotResettable: its steps are random.
     """
     rng = np.random.default_rng(0)
     actions = [_action(env, rng) for _ in range(2 * PROOF_STEPS)]
@@ -158,7 +158,7 @@ def check_replays(env: Any) -> None:
         env.reset(seed=seed)
         walks.append(_walk(env, actions))
     if walks[0] != walks[2]:
-        raise NoResetAnywhere(f"{type(env).__name__} cannot be reset anywhere: the same actions from the same seed "
+        raise NotResettable(f"{type(env).__name__} cannot be reset anywhere: the same actions from the same seed "
                               f"lead elsewhere, so its steps are random; make the randomness part of its state")
 
 

@@ -9,8 +9,8 @@ from typing import Any
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.results.folder import CONFIG, PROVENANCE, RESULT, read_json, read_toml
 
-KINDS = {"study": "study", "planners": "comparison", "chain": "evaluation", "method": "training", "planner": "plan"}
-"""What a folder holds, by the first of these settings that its config.toml has."""
+KINDS = ("plan", "train", "eval", "compare", "study")
+"""What a folder may hold: the `kind` of its config.toml, named after the verb that wrote it."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Folder:
 
     Attributes:
         path: Where it is.
-        kind: One of the values of `KINDS`.
+        kind: One of `KINDS`.
         config: The settings that repeat it.
         result: What came out; None when the run has not ended.
         provenance: The versions and machines that worked here, one dictionary each.
@@ -61,9 +61,10 @@ def read_folder(path: Path) -> Folder:
         DamagedFile: a file in it is damaged, or its settings are not those of a run.
     """
     config = read_toml(path / CONFIG)
-    kind = next((kind for key, kind in KINDS.items() if key in config), None)
-    if kind is None:
-        raise DamagedFile(f"{path / CONFIG} is not that of a run; expected one of the settings {', '.join(KINDS)}")
+    kind = config.get("kind")
+    if kind not in KINDS:
+        raise DamagedFile(f"{path / CONFIG} is not that of a run: its kind is {kind!r}; expected one of "
+                          f"{', '.join(KINDS)}")
     result = read_json(path / RESULT) if (path / RESULT).is_file() else None
     if not isinstance(result, dict | None):
         raise DamagedFile(f"{path / RESULT} is not a result; expected a JSON object")

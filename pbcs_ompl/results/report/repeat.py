@@ -6,11 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.registry import names
 from pbcs_ompl.experiments.study.study import SWEEP, study_folders
 from pbcs_ompl.resettable.make import is_known
-from pbcs_ompl.results.command_words import environment_words, json_words
-from pbcs_ompl.results.folder import plain, read_json, read_toml
+from pbcs_ompl.results.command_words import environment_words, json_words, rule_words
+from pbcs_ompl.results.folder import read_json, read_toml
 from pbcs_ompl.results.report.folder import Folder
 
 Words = list[str]
@@ -26,7 +28,7 @@ def repeating(folder: Folder) -> str:
     """
     if not _at_hand(folder):
         return ""
-    if folder.kind == "comparison" and not _fits_command_line(folder.config):
+    if folder.kind == "compare" and not _fits_command_line(folder.config):
         return _comparison_script(folder.config)
     words = _words(folder)
     return shlex.join(["pbcs", *words]) if words else ""
@@ -34,10 +36,10 @@ def repeating(folder: Folder) -> str:
 
 def going_on(folder: Folder) -> str:
     """Return the command that goes on with a run that has not ended; "" for one that has."""
-    if folder.kind == "training" and (folder.result is None or (folder.path / CHECKPOINT).is_file()):
+    if folder.kind == "train" and (folder.result is None or (folder.path / CHECKPOINT).is_file()):
         budget = ["--max-transitions", str(2 * folder.config["max_transitions"])] if folder.result else []
         return shlex.join(["pbcs", "train", "--resume", str(folder.path), *budget])
-    if folder.kind in ("comparison", "study") and folder.result is None and repeating(folder).startswith("pbcs "):
+    if folder.kind in ("compare", "study") and folder.result is None and repeating(folder).startswith("pbcs "):
         return f"{repeating(folder)} {shlex.join(['--out', str(folder.path)])}"
     return ""
 
@@ -46,7 +48,7 @@ def _at_hand(folder: Folder) -> bool:
     config = folder.config
     environments = {config["env"]} if "env" in config else {place["env"] for place in config.get("environments", [])}
     planners = {config["planner"]} if "planner" in config else set(config.get("planners", []))
-    agents = {config["agent"]} if folder.kind == "training" else set()
+    agents = {config["agent"]} if folder.kind == "train" else set()
     return folder.kind == "study" or (
         all(map(is_known, environments)) and all(_is_registered("agent", name) for name in agents)
         and all(_is_registered("planner", name) for name in planners))
@@ -64,13 +66,13 @@ def _fits_command_line(config: dict[str, Any]) -> bool:
 
 def _words(folder: Folder) -> Words:
     makers: dict[str, Callable[[Folder], Words]] = {
-        "plan": _plan, "training": _training, "evaluation": _evaluation, "comparison": _comparison, "study": _study}
+        "plan": _plan, "train": _training, "eval": _evaluation, "compare": _comparison, "study": _study}
     return makers[folder.kind](folder)
 
 
 def _plan(folder: Folder) -> Words:
     config = folder.config
-    return ["plan", *environment_words(config["env"], config["env_kwargs"]), "--planner", config["planner"],
+    return ["plan", *environment_words(EnvSpec.from_dict(config["environment"])), "--planner", config["planner"],
             *json_words("--planner-kwargs", config["planner_kwargs"]), "--seed", str(config["seed"]), *_budget(config)]
 
 
@@ -83,7 +85,7 @@ def _training(folder: Folder) -> Words:
                     *json_words("--planner-kwargs", config.get("planner_kwargs", {}))]
     named = [word for name in ("method", "agent", "preset", "device", "seed")
              for word in (f"--{name}", str(config[name]))]
-    return ["train", *environment_words(config["env"], config["env_kwargs"]), *planning, *named,
+    return ["train", *environment_words(EnvSpec.from_dict(config["environment"])), *planning, *named,
             *json_words("--settings", config["settings"]), *json_words("--agent-settings", config["agent_settings"]),
             *_budget(config)]
 
@@ -96,11 +98,13 @@ def _evaluation(folder: Folder) -> Words:
 def _comparison(folder: Folder) -> Words:
     config, places = folder.config, folder.config["environments"]
     options = {name: chosen for name, chosen in config["planner_kwargs"].items() if chosen}
-    if len(places) == 1:
-        environments = environment_words(places[0]["env"], places[0]["env_kwargs"])
+    specs = [EnvSpec.from_dict(place) for place in places]
+    if len(specs) == 1:
+        environments = environment_words(specs[0])
     else:
-        environments = ["--env", *(place["env"] for place in places),
-                        "--env-kwargs", *(json.dumps(place["env_kwargs"], default=plain) for place in places)]
+        environments = ["--env", *(spec.id for spec in specs),
+                        "--env-kwargs", *(json.dumps(spec.kwargs, default=plain) for spec in specs),
+                        *rule_words(specs[0])]
     return ["compare", "--planners", *config["planners"], *json_words("--planner-kwargs", options), *environments,
             "--seeds", str(len(config["seeds"])), *_budget(config)]
 
@@ -108,7 +112,7 @@ def _comparison(folder: Folder) -> Words:
 def _study(folder: Folder) -> Words:
     """Return nothing where no study at hand has this name and this sweep: it would be another study."""
     config = folder.config
-    sweep = {key: value for key, value in config.items() if key not in ("study", "folder", "seeds")}
+    sweep = {key: value for key, value in config.items() if key not in ("kind", "study", "folder", "seeds")}
     seeds = ["--seeds", str(config["seeds"])] if "seeds" in config else []
     places = [(name, place) for name, place in study_folders().items() if name == config["study"]]
     places += [(config["folder"], Path(config["folder"]))] if "folder" in config else []
@@ -125,12 +129,12 @@ def _comparison_script(config: dict[str, Any]) -> str:
     """Return the script of a comparison that the command line cannot name."""
     places = config["environments"]
     planners = {name: config["planner_kwargs"].get(name, {}) for name in config["planners"]}
-    settings = {"env_kwargs": [place["env_kwargs"] for place in places]}
-    settings |= {name: config[name] for name in ("seeds", *BUDGET) if name in config}
+    settings = {name: config[name] for name in ("seeds", *BUDGET) if name in config}
     lines = [f"            {name}={value!r}," for name, value in settings.items()]
-    return "\n".join(["from pbcs_ompl.experiments.compare import compare", "", 'if __name__ == "__main__":',
-                      f"    compare({planners!r},", f"            {[place['env'] for place in places]!r},", *lines,
-                      '            out="runs/again")'])
+    environments = [EnvSpec.from_dict(place) for place in places]
+    return "\n".join(["from pbcs_ompl.core.env_spec import EnvSpec",
+                      "from pbcs_ompl.experiments.compare import compare", "", 'if __name__ == "__main__":', f"    compare({planners!r},", f"            {environments!r},",
+                      *lines, '            out="runs/again")'])
 
 
 def _budget(config: dict[str, Any]) -> Words:

@@ -16,8 +16,8 @@ from pbcs_ompl.results.report.single import evaluation_content, plan_content, tr
 from pbcs_ompl.results.report.study import study_content
 
 CONTENTS: dict[str, Callable[[Folder], Content]] = {
-    "plan": plan_content, "training": training_content, "evaluation": evaluation_content,
-    "comparison": comparison_content, "study": study_content}
+    "plan": plan_content, "train": training_content, "eval": evaluation_content,
+    "compare": comparison_content, "study": study_content}
 PNG = b"\x89PNG\r\n\x1a\n"
 HEAD = Struct(">8s8xII")
 """The first bytes of a PNG: its signature, the length and name of its first chunk, the width and the height."""

@@ -3,6 +3,7 @@
 from textwrap import shorten
 from typing import Any
 
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.formatting import duration, percent, short
 from pbcs_ompl.results.report.content import UNFINISHED, Content
 from pbcs_ompl.results.report.folder import Folder
@@ -55,5 +56,4 @@ def evaluation_content(folder: Folder) -> Content:
 
 def environment_name(config: dict[str, Any]) -> str:
     """Return the id of an environment with its options, for a title: the settings have them in full."""
-    options = ", ".join(f"{name}={value}" for name, value in config.get("env_kwargs", {}).items())
-    return f"{config['env']}({shorten(options, 80, placeholder=' ...')})" if options else str(config["env"])
+    return shorten(EnvSpec.from_dict(config["environment"]).label, 100, placeholder=" ...")

@@ -50,7 +50,7 @@ def settings(folder):
 def test_a_plan(laboratory, call):
     folder = Path("runs/plan")
     (model, planner), options = call(repeating(read_folder(folder)))
-    again = {"env": model.env_id, "env_kwargs": model.env_kwargs, "planner": planner}
+    again = {"env": model.spec.id, "env_kwargs": model.spec.kwargs, "planner": planner}
     assert again | {name: options[name] for name in options.keys() - {"out", "on_progress"}} == settings(folder)
     assert settings(folder)["env_kwargs"]["--goal"] == "reward>0"
 
@@ -68,7 +68,7 @@ def test_a_training(laboratory, call, name):
 
 def test_an_evaluation(laboratory, call):
     (chain, model), options = call(repeating(read_folder(Path("runs/evaluation"))))
-    again = {"env": model.env_id, "env_kwargs": model.env_kwargs, "chain": "runs/training", **options}
+    again = {"env": model.spec.id, "env_kwargs": model.spec.kwargs, "chain": "runs/training", **options}
     assert again == settings(Path("runs/evaluation"))
     assert len(chain.skills) > 0
 

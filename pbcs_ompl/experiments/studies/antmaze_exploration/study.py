@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
 
 ENV = "pbcs/AntMaze-v0"
@@ -29,7 +30,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     return record
 
 
-def bin_counts(model: ResetAnywhere, states: Array) -> Array:
+def bin_counts(model: ResettableModel, states: Array) -> Array:
     """Return the number of nodes in each bin of the maze [X, Y]."""
     low, high = model.feature_low, model.feature_high
     x, y = model.feature(states).T

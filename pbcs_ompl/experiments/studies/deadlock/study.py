@@ -7,8 +7,9 @@ import numpy as np
 
 from pbcs_ompl.agents.noise import make_noise
 from pbcs_ompl.agents.stacked_agent import StackedAgent
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.registry import load
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.diagnostics import value_slices
 from pbcs_ompl.experiments.study.joined import chunks
 from pbcs_ompl.experiments.study.observers import Probe
@@ -51,7 +52,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
             "critics": _critics(training.agent, failed[:MOST_CRITICS]) if len(failed) else []}
 
 
-def _agent(settings: dict[str, Any], model: ResetAnywhere, seeds: list[int]) -> StackedAgent:
+def _agent(settings: dict[str, Any], model: ResettableModel, seeds: list[int]) -> StackedAgent:
     kind = load("agent", settings["agent"])
     # A GPU's update would be compiled anew each time that the stack shrinks.
     return kind(model.observation_size, model.action_low, model.action_high, seeds=seeds, device=settings["device"],

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
 from pbcs_ompl.skills.exploration import without_goal
 
@@ -41,7 +42,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     return record
 
 
-def cells(model: ResetAnywhere, states: Array, cell: float) -> tuple[Array, Array]:
+def cells(model: ResettableModel, states: Array, cell: float) -> tuple[Array, Array]:
     """Return, for each square cell, the number of states in it and how much of it can be reached, in [0, 1]."""
     low, high = model.state_low, model.state_high
     shape = np.round((high - low) / cell).astype(int)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import mannwhitneyu, t
 
-from pbcs_ompl.core.contracts import Array
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.experiments.study import Claim, rate
 from pbcs_ompl.figures.canvas import new_figure, save
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from pbcs_ompl.agents import TD3, Policy, TD3Settings
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.folder import write_arrays
 
@@ -21,7 +22,7 @@ STARTS = 10
 X = 1
 
 
-def returns(model: ResetAnywhere, policy: Policy, starts: Array) -> Array:
+def returns(model: ResettableModel, policy: Policy, starts: Array) -> Array:
     """Return the sparse returns [B] of a policy without noise, one episode from each start [B, D]."""
     states, total = starts.copy(), np.zeros(len(starts))
     for _ in range(EPISODE):

@@ -12,9 +12,10 @@ import numpy as np
 from pbcs_ompl.agents import Policy
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.agents.update import one_thread
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.registry import load
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.folder import read_arrays
 
@@ -48,7 +49,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
             "returns": returns, "primed": primed, "final": final}
 
 
-def _episode(model: ResetAnywhere, actor: Policy, start: int, noise: float, rng: np.random.Generator,
+def _episode(model: ResettableModel, actor: Policy, start: int, noise: float, rng: np.random.Generator,
              agent: StackedAgent | None) -> float:
     """Run an episode from `reset(seed=start)`, which `agent` remembers, and return its return."""
     low, high = model.action_low, model.action_high

@@ -8,7 +8,8 @@ from pbcs_ompl.agents import DDPG, DDPGSettings
 from pbcs_ompl.agents.noise import EpsilonGreedy
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.agents.update import one_thread
-from pbcs_ompl.core.contracts import Array, ResetAnywhere
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.experiments.study.joined import chunks
 from pbcs_ompl.experiments.study.stacked_training import LoopSettings, StackedTraining, solved
 from pbcs_ompl.resettable import make
@@ -45,7 +46,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     return {**kept, **curves, "pictures": pictures}
 
 
-def _trained(model: ResetAnywhere, settings: dict[str, Any], seeds: list[int],
+def _trained(model: ResettableModel, settings: dict[str, Any], seeds: list[int],
              steps: int) -> tuple[StackedAgent, dict[str, Any]]:
     agent = DDPG(model.observation_size, model.action_low, model.action_high, seeds=seeds, device=settings["device"],
                  settings=DDPGSettings(**settings["agent"]))
@@ -55,7 +56,7 @@ def _trained(model: ResetAnywhere, settings: dict[str, Any], seeds: list[int],
                                                                                               steps)
 
 
-def _mini_batches(model: ResetAnywhere, seeds: list[int], explored: int, count: int) -> dict[str, Any]:
+def _mini_batches(model: ResettableModel, seeds: list[int], explored: int, count: int) -> dict[str, Any]:
     """Count the transitions that a wall stopped, and those that an inner one stopped; draw one mini-batch."""
     found = [explore(model, explored, seed + 1) for seed in seeds]
     low, high = model.state_low + HALF_WALL, model.state_high - HALF_WALL
@@ -67,14 +68,14 @@ def _mini_batches(model: ResetAnywhere, seeds: list[int], explored: int, count: 
             "batch": [found[0].states[rows].tolist(), found[0].next_states[rows].tolist()]}
 
 
-def _fill(agent: StackedAgent, model: ResetAnywhere, count: int) -> None:
+def _fill(agent: StackedAgent, model: ResettableModel, count: int) -> None:
     """Fill each seed's replay buffer with an exploration of its own. No state is terminal in chapter 4."""
     found = [explore(model, count, seed + 1) for seed in agent.seeds]
     agent.remember(*(np.stack([getattr(one, name) for one in found])
                      for name in ("states", "controls", "rewards", "next_states")), np.zeros((len(found), count)))
 
 
-def _offline(agent: StackedAgent, model: ResetAnywhere, settings: dict[str, Any]) -> dict[str, Any]:
+def _offline(agent: StackedAgent, model: ResettableModel, settings: dict[str, Any]) -> dict[str, Any]:
     starts = np.array([model.initial_state(seed) for seed in agent.seeds])
     every, success = settings["evaluate_every"], []
     with one_thread():
@@ -84,14 +85,14 @@ def _offline(agent: StackedAgent, model: ResetAnywhere, settings: dict[str, Any]
     return {"at": [every * (row + 1) for row in range(len(success))], "success": success}
 
 
-def _with_rollouts(agent: StackedAgent, model: ResetAnywhere, settings: dict[str, Any], steps: int) -> dict[str, Any]:
+def _with_rollouts(agent: StackedAgent, model: ResettableModel, settings: dict[str, Any], steps: int) -> dict[str, Any]:
     loop = LoopSettings(steps, episode_steps=settings["episode_steps"],
                         evaluate_every=settings["evaluate_every"])
     curves = StackedTraining(model, agent, EpsilonGreedy(0.1), loop).run()
     return {"at": curves.steps, "success": np.array(curves.success).astype(int).tolist()}
 
 
-def _picture(agent: StackedAgent, model: ResetAnywhere, steps: int) -> dict[str, Any]:
+def _picture(agent: StackedAgent, model: ResettableModel, steps: int) -> dict[str, Any]:
     """Return Q(s, pi(s)) and pi(s) of the first seed on a grid, and one rollout."""
     middle = (np.arange(GRID) + 0.5) / GRID * model.state_high[0]
     states = np.stack(np.meshgrid(middle, middle), axis=-1).reshape(-1, 2)
@@ -101,7 +102,7 @@ def _picture(agent: StackedAgent, model: ResetAnywhere, steps: int) -> dict[str,
             "rollout": _rollout(agent, model, steps).tolist()}
 
 
-def _rollout(agent: StackedAgent, model: ResetAnywhere, steps: int) -> Array:
+def _rollout(agent: StackedAgent, model: ResettableModel, steps: int) -> Array:
     state = model.initial_state(agent.seeds[0])
     trace = [state]
     for _ in range(steps):

@@ -1,41 +1,23 @@
-"""What the rooms of the toolkit promise each other.
+"""The interfaces between the subpackages: a resettable environment, and what builds a planner.
 
-Axes: B batch, N nodes, T time, D state, A action, O observation, F feature. All arrays are float64 unless said
-otherwise; states are complete: everything that is needed to restart the simulator.
+States are complete: everything that is needed to restart the simulator.
 """
 
-from collections.abc import Callable
-from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IndexArray = NDArray[np.int64]
-Capability = Literal["visited", "arbitrary", "exact"]
+from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.types import Array, BoolArray, Capability, Counter, Transition
 
 
-class Transition(NamedTuple):
-    """The outcome of one step of a batch of states."""
-
-    states: Array
-    """Next states [B, D]."""
-    rewards: Array
-    """Rewards [B]."""
-    terminated: BoolArray
-    """Whether the episode ends in the next state [B]. Planners never expand such a state."""
-    success: BoolArray
-    """Whether the next state reaches the environment's goal [B]."""
-
-
-class ResetAnywhere(Protocol):
+class ResettableModel(Protocol):
     """An environment seen as functions of states: what planners and skills work on.
 
     One adapter for each family of environments lies in `pbcs_ompl.resettable`.
 
     Attributes:
-        env_id, env_kwargs: What `gymnasium.make` needs to build the same environment again.
+        spec: What makes the same model again, in another process too.
         capabilities: "visited" states can be restored; "arbitrary" vectors within the bounds too; "exact" means
             that a restored state continues bit for bit.
         state_low, state_high: Bounds of the state [D], finite.
@@ -51,8 +33,7 @@ class ResetAnywhere(Protocol):
         goal_circle: Centre and radius (x, y, r) of the goal in the same plane, for pictures; None when unknown.
     """
 
-    env_id: str
-    env_kwargs: dict[str, Any]
+    spec: EnvSpec
     capabilities: frozenset[Capability]
     state_low: Array
     state_high: Array
@@ -142,28 +123,11 @@ class VectorisedEnv(Protocol):
     def is_valid(self, states: Array) -> BoolArray: ...
 
 
-class Counter:
-    """Counts transitions against a budget, in one place for all planners.
-
-    Args:
-        budget: The most transitions that may be made; None for no bound.
-    """
-
-    def __init__(self, budget: int | None = None):
-        self.count = 0
-        self.budget = budget
-
-    @property
-    def left(self) -> int:
-        """Transitions that may still be made."""
-        return 2**62 if self.budget is None else max(0, self.budget - self.count)
-
-
 @runtime_checkable
 class BatchPlanner(Protocol):
     """A planner that can propagate many states together when the environment allows it."""
 
-    def use_model(self, model: ResetAnywhere, counter: Counter) -> None:
+    def use_model(self, model: ResettableModel, counter: Counter) -> None:
         """Propagate through `model` from now on, and count every transition in `counter`."""
         ...
 
@@ -175,7 +139,3 @@ class PlannerFactory(Protocol):
     def build(self, si: Any, *, seed: int, **options: Any) -> Any:
         """Return a new planner for the space information `si`."""
         ...
-
-
-ProgressCallback = Callable[[dict[str, Any]], None]
-"""Called now and then with plain numbers; must be quick and must not raise."""

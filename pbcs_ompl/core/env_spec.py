@@ -1,0 +1,71 @@
+"""The task as one object: which environment, what a success is, what planners explore, where episodes start."""
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption
+from pbcs_ompl.core.plain import plain
+
+
+@dataclass(frozen=True)
+class EnvSpec:
+    """What makes the same resettable model again, in this or another process.
+
+    Attributes:
+        id: The id that `gymnasium.make` takes, such as "pbcs/Maze-v0" or "module:id".
+        kwargs: Options of the environment.
+        goal: What a success is, as a rule; None for what the environment reports (see `resettable.rules`).
+        feature: What planners explore, as a rule; None for the adapter's choice.
+        start_seed: Every episode starts as `reset(seed=start_seed)` does; None where each has a seed of its own.
+
+    Raises:
+        InvalidOption: `start_seed` is not an integer >= 0.
+    """
+
+    id: str
+    kwargs: dict[str, Any] = field(default_factory=dict)
+    goal: str | None = None
+    feature: str | None = None
+    start_seed: int | None = None
+
+    def __post_init__(self) -> None:
+        seed = self.start_seed
+        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int) or seed < 0):
+            raise InvalidOption(f"start_seed is {seed!r}; expected an integer >= 0")
+
+    @property
+    def label(self) -> str:
+        """Its name in tables, as pbcs/Maze-v0(size=7); without spaces, because OMPL's benchmark log allows none."""
+        rules = {name: value for name, value in self.to_dict().items() if name not in ("id", "kwargs")}
+        options = ",".join(f"{name}={_compact(value)}" for name, value in {**self.kwargs, **rules}.items())
+        return "".join((f"{self.id}({options})" if options else self.id).split())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, as files hold them; rules that are None are left out."""
+        rules = {"goal": self.goal, "feature": self.feature, "start_seed": self.start_seed}
+        kwargs = json.loads(json.dumps(self.kwargs, default=plain))
+        return {"id": self.id, "kwargs": kwargs, **{name: rule for name, rule in rules.items() if rule is not None}}
+
+    @classmethod
+    def from_dict(cls, values: Any) -> "EnvSpec":
+        """Return the spec whose `to_dict` this was.
+
+        Raises:
+            DamagedFile: it was none.
+        """
+        try:
+            return cls(**values)
+        except (TypeError, InvalidOption) as error:
+            raise DamagedFile(f"the environment {values!r} is damaged: {error}") from error
+
+    def same_as(self, other: "EnvSpec") -> bool:
+        """Return whether both make the same model: arrays, tuples and lists of the same numbers are equal."""
+        return self.to_dict() == other.to_dict()
+
+    def __str__(self) -> str:
+        return self.label
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, default=plain, separators=(",", ":")).strip('"')

@@ -1,0 +1,57 @@
+"""The checks of what a user gives: names and ranges, each with one message."""
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from pbcs_ompl.core.errors import InvalidOption, did_you_mean
+
+
+def check_names(owner: str, kind: str, given: Collection[str], known: Collection[str]) -> None:
+    """Refuse names that do not exist.
+
+    Args:
+        owner: What has the options, as in "planner 'Ex'".
+        kind: What is named: "option", "setting".
+        given: The names that were given.
+        known: The names that exist.
+
+    Raises:
+        InvalidOption: one does not exist; the closest is suggested.
+    """
+    for name in given:
+        if name not in known:
+            hint = did_you_mean(name, known) or f"; it takes no {kind}s"
+            raise InvalidOption(f"{owner} has no {kind} {name!r}{hint}")
+
+
+def check_range(name: str, value: Any, holds: bool, expected: str) -> None:
+    """Refuse a value outside of its range.
+
+    Args:
+        name: The option.
+        value: What was given.
+        holds: Whether it is allowed.
+        expected: The range in words, such as "at least 1" or "within [0, 1]".
+
+    Raises:
+        InvalidOption: it is not allowed.
+    """
+    if not holds:
+        raise InvalidOption(f"{name} is {value!r}; expected {expected}")
+
+
+def check_types(values: Mapping[str, Any], types: Mapping[str, type]) -> None:
+    """Refuse values of another type than that of their names; integers serve as floats, booleans as neither.
+
+    Args:
+        values: What was given, by name.
+        types: The type that each name wants.
+
+    Raises:
+        InvalidOption: a value has another type.
+    """
+    for name, value in values.items():
+        wanted = types[name]
+        allowed = (int, float) if wanted is float else wanted
+        if not isinstance(value, allowed) or (isinstance(value, bool) and wanted is not bool):
+            raise InvalidOption(f"{name} is {value!r}; expected {wanted.__name__}")

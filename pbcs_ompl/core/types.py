@@ -1,0 +1,48 @@
+"""The types of the toolkit: arrays, transitions, the counter of transitions.
+
+Axes: B batch, N nodes, T time, D state, A action, O observation, F feature. All arrays are float64 unless said
+otherwise.
+"""
+
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IndexArray = NDArray[np.int64]
+Capability = Literal["visited", "arbitrary", "exact"]
+ProgressCallback = Callable[[dict[str, Any]], None]
+"""Called now and then with plain numbers; must be quick and must not raise."""
+
+
+class Transition(NamedTuple):
+    """The outcome of one step of a batch of states."""
+
+    states: Array
+    """Next states [B, D]."""
+    rewards: Array
+    """Rewards [B]."""
+    terminated: BoolArray
+    """Whether the episode ends in the next state [B]. Planners never expand such a state."""
+    success: BoolArray
+    """Whether the next state reaches the environment's goal [B]."""
+
+
+class Counter:
+    """Counts transitions against a budget, in one place for all planners.
+
+    Args:
+        budget: The most transitions that may be made; None for no bound.
+    """
+
+    def __init__(self, budget: int | None = None):
+        self.count = 0
+        self.budget = budget
+
+    @property
+    def left(self) -> int:
+        """Transitions that may still be made."""
+        return 2**62 if self.budget is None else max(0, self.budget - self.count)
