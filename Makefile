@@ -1,19 +1,22 @@
 # Two commands: `make demo` and `make test`. Both need Python 3.11 or newer and make, nothing else.
-# PYTHON=... picks another interpreter, PIP_ARGS=... is handed to pip (another index, an offline folder of wheels).
+# PYTHON=... picks another interpreter, PIP_ARGS=... are arguments of pip (another index, an offline folder of wheels),
+# EXTRAS=... are the optional dependencies to install.
 
 PYTHON ?= python3
 PIP_ARGS ?=
+EXTRAS ?= all,dev
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check bench clean
+.PHONY: help setup demo test slow check bench clean
 
 help:
 	@echo "make demo    install, train a skill chain on a 5x5 maze, show the result"
 	@echo "make test    install, run the tests, show the maze solve rates"
+	@echo "make slow    the tests that take minutes"
 	@echo "make check   lint, types, direction of imports"
 	@echo "make bench   measure what the README's table states (takes long)"
 	@echo "make setup   only prepare $(VENV)"
@@ -25,7 +28,7 @@ $(STAMP): pyproject.toml constraints.txt
 		{ echo "make: $(PYTHON) is too old: Python 3.11 or newer is needed (make PYTHON=python3.12 ...)" >&2; exit 2; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@rm -rf pbcs_ompl.egg-info  # an old one hides new entry points from everything that runs in this folder
-	$(BIN)/python -m pip install --quiet $(PIP_ARGS) -c constraints.txt -e '.[all,dev]'
+	$(BIN)/python -m pip install --quiet $(PIP_ARGS) -c constraints.txt -e '.[$(EXTRAS)]'
 	@touch $@
 
 demo: setup
@@ -35,9 +38,13 @@ demo: setup
 test: setup
 	$(BIN)/python -m pytest -n $(WORKERS)
 
+slow: setup
+	$(BIN)/python -m pytest -n $(WORKERS) -m slow
+
 check: setup
 	$(BIN)/ruff check
 	$(BIN)/mypy
+	$(BIN)/basedpyright --warnings
 	$(BIN)/lint-imports --no-logo
 
 bench: setup

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from pbcs_ompl.cli import main
+from pbcs_ompl.results.folder import read_toml
 
 
 def last_json(capsys: pytest.CaptureFixture[str]) -> dict:
@@ -32,8 +33,8 @@ def test_rules_go_where_the_plan_goes(tmp_path: Path, monkeypatch: pytest.Monkey
     assert "goal      obs[0]>0.99" in captured.err
     assert "random steps, widened" in captured.err
     assert json.loads(captured.out.splitlines()[-1])["replay_ok"]
-    assert '"--goal" = "obs[0]>0.99"' in (tmp_path / "found/config.toml").read_text()
-    assert '"--start-seed" = 3' in (tmp_path / "found/config.toml").read_text()
+    assert read_toml(tmp_path / "found/config.toml")["environment"] == {
+        "id": "Pendulum-v1", "kwargs": {}, "goal": "obs[0]>0.99", "feature": "state", "start_seed": 3}
 
 
 def test_a_process_without_mujoco(tmp_path: Path) -> None:

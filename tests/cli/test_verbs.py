@@ -72,7 +72,7 @@ def test_compare_in_several_environments_with_options(pbcs, tmp_path):
                                 "--env pbcs/Maze-v0 pbcs/Box-v0 --start-seed 4 --seeds 6 --max-seconds 60 "
                                 "--max-transitions 2000 --out both --json")
     assert status == 0
-    labels = ["pbcs/Maze-v0(--start-seed=4)", "pbcs/Box-v0(--start-seed=4)"]
+    labels = ["pbcs/Maze-v0(start_seed=4)", "pbcs/Box-v0(start_seed=4)"]
     assert [row["environment"] for row in found["rows"]] == [labels[0], labels[0], labels[1], labels[1]]
     assert [test["environment"] for test in found["tests"]] == labels
     assert all(f"in        {label}\n" in error for label in labels)

@@ -1,0 +1,61 @@
+"""One vocabulary: the words of the field, in identifiers, docstrings, comments, messages and pages alike."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+WORDS = {
+    r"doors?": "propagator, or interface",
+    r"rooms?": "subpackage, or space",
+    r"milestones?": "waypoint",
+    r"learners?": "trainer, or training method",
+    r"crews?": "workers",
+    r"cures?|cured": "variant",
+    r"anew": "again, or from scratch",
+    r"mend(s|ed|ing)?": "repair, or fix",
+    r"whence": "from which",
+    r"tells?|told|telling": "return, report, say",
+    r"nobody|somebody|anybody('s)?": "unknown, none, others, third-party",
+    r"furnish(es|ed)?": "draw",
+    r"descend(s|ed)?": "step of an optimiser",
+    r"slopes?": "gradient",
+    r"tapes?": "activations",
+    r"forgets? everything|remembers?|remembered": "keep, store, add",
+    r"arrives?|arrived": "succeed, reach the goal",
+    r"(goes|went|going) on": "continue, resume",
+    r"came of|comes of": "result",
+    r"so many|so much": "N",
+    r"hands? (back|out)|handed back": "return",
+    r"in the midst": "in the middle",
+    r"go the way": "replay",
+    r"taken? off": "remove",
+}
+"""Words that a native-speaking engineer would stop at, and what to write instead."""
+PATTERN = re.compile(r"\b(" + "|".join(WORDS) + r")\b", re.IGNORECASE)
+ALLOWED = {
+    "tests/docs/test_words.py": WORDS.keys(),
+}
+
+
+def pages() -> list[str]:
+    listed = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "*.py", "*.md", "*.toml",
+                             "*.html", "Makefile"], cwd=ROOT, capture_output=True, text=True, check=True)
+    return [name for name in listed.stdout.split() if (ROOT / name).is_file()]
+
+
+def plain_words(line: str) -> str:
+    """Return a line whose identifiers are split into words."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", line).replace("_", " ")
+
+
+@pytest.mark.parametrize("page", pages())
+def test_the_words_are_those_of_the_field(page: str) -> None:
+    if page in ALLOWED:
+        return
+    found = [f"{page}:{number}: {match[0]!r} in {line.strip()[:90]!r}"
+             for number, line in enumerate((ROOT / page).read_text().splitlines(), start=1)
+             for match in PATTERN.finditer(plain_words(line))]
+    assert not found, "\n".join(found)
