@@ -8,12 +8,10 @@ from pbcs_ompl.cli.values import choice, fraction, integer, json_object, part, s
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
-METHODS = ("pbcs", "pb", "backplay", "plain", "bootstrapped", "offline")
-PRESETS = ("fast", "thesis")
 EXECUTORS = ("local", "ray")
 SCHEDULERS = ("make", "slurm")
 DESCRIPTION = """\
-Plan with OMPL in any environment that can be reset anywhere,
+Plan with OMPL in any environment that can be reset,
 then train a chain of skills along the plan.
 """
 EPILOG = """\
@@ -112,7 +110,7 @@ def _check_options(words: Sequence[str], parser: Parser) -> None:
 
 
 def _doctor(verb: Parser) -> None:
-    """show versions, known bad pairs, plug-ins found, and whether an environment can be reset anywhere"""
+    """show versions, known bad pairs, plug-ins found, and whether an environment is resettable"""
     _add_environment(verb, required=False)
 
 
@@ -130,12 +128,12 @@ def _plan(verb: Parser) -> None:
 def _train(verb: Parser) -> None:
     """plan a trajectory, then train a chain of skills along it"""
     _add_environment(verb, required=False)
-    verb.add_argument("--method", type=choice("method", METHODS), default="pbcs", metavar="NAME",
-                      help=f"one of {', '.join(METHODS)} (pbcs)")
+    verb.add_argument("--method", default="pbcs", metavar="NAME",
+                      help="pbcs, pb, backplay, plain, bootstrapped or offline (pbcs)")
     _add_planner(verb)
     verb.add_argument("--agent", default="ddpg", metavar="NAME", help="registered, or module:Class (ddpg)")
     verb.add_argument("--device", default="cpu", metavar="NAME", help="where the agent learns: cpu or cuda (cpu)")
-    verb.add_argument("--preset", type=choice("preset", PRESETS), default="fast", metavar="NAME",
+    verb.add_argument("--preset", default="fast", metavar="NAME",
                       help="fast: ours; thesis: the settings of [Matheron2020] (fast)")
     verb.add_argument("--settings", type=json_object, default={}, metavar="JSON",
                       help="skill settings that differ from the preset, such as '{\"activation\": \"classifier\"}'")
@@ -145,9 +143,9 @@ def _train(verb: Parser) -> None:
                       help="train along this plan, a folder of pbcs plan or a trajectory")
     _add_seed(verb)
     verb.add_argument("--max-transitions", type=integer(1), metavar="N",
-                      help="stop after so many environment steps (10,000,000)")
+                      help="stop after N environment steps (10,000,000)")
     _add_out(verb)
-    verb.add_argument("--resume", metavar="DIR", help="go on with a training run that was stopped")
+    verb.add_argument("--resume", metavar="DIR", help="continue a training that was stopped")
 
 
 def _eval(verb: Parser) -> None:
@@ -190,7 +188,7 @@ def _study(verb: Parser) -> None:
                       help="make the I-th of N parts of the runs, from 1; parts may share --out at the same time")
     verb.add_argument("--emit", type=choice("scheduler", SCHEDULERS), metavar="NAME",
                       help="make nothing, write the runs for a scheduler into --out: make (a Makefile) or slurm")
-    verb.add_argument("--out", metavar="DIR", help="folder for the results; a study that was stopped goes on there")
+    verb.add_argument("--out", metavar="DIR", help="folder for the results; a study that was stopped continues there")
 
 
 def _report(verb: Parser) -> None:
@@ -234,7 +232,7 @@ def _add_seed(verb: Parser) -> None:
 
 def _add_budget(verb: Parser, default: int) -> None:
     verb.add_argument("--max-transitions", type=integer(1), default=default, metavar="N",
-                      help=f"stop after so many environment steps ({default:,})")
+                      help=f"stop after N environment steps ({default:,})")
 
 
 def _add_out(verb: Parser) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 from pbcs_ompl.cli.executor import executor
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_comparison
-from pbcs_ompl.cli.terminal import Report, conclude, list_files
+from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
 from pbcs_ompl.core.formatting import duration, short
 from pbcs_ompl.experiments.compare import compare
@@ -23,16 +23,16 @@ def run(arguments: Namespace) -> int:
     out = Path(arguments.out or fresh_folder("compare", *_names(arguments), arguments.seeds))
     budget = len(planners) * max(len(arguments.env), len(arguments.env_kwargs)) * arguments.seeds
     try:
-        with executor(arguments) as jobs, Report("compare", count="runs", budget=budget) as report:
+        with executor(arguments) as jobs, ProgressDisplay("compare", count="runs", budget=budget) as display:
             comparison = compare(planners, arguments.env, env_kwargs=arguments.env_kwargs, goal=arguments.goal,
                                  feature=arguments.feature, start_seed=arguments.start_seed, seeds=arguments.seeds,
                                  max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds,
-                                 max_memory=arguments.max_memory, jobs=jobs, out=out, on_progress=report)
+                                 max_memory=arguments.max_memory, jobs=jobs, out=out, on_progress=display)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"go on with the same command and --out {out}") from None
+        raise KeyboardInterrupt(f"continue with the same command and --out {out}") from None
     draw_comparison(comparison, f"{arguments.seeds} seeds", out)
     summary = comparison.summary()
-    conclude(summary, _closing_lines(summary, out), as_json=arguments.json)
+    print_summary(summary, _closing_lines(summary, out), as_json=arguments.json)
     return 0 if any(row["solved"] for row in summary["rows"]) else 1
 
 

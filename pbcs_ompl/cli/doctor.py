@@ -11,7 +11,7 @@ from typing import Any
 from pbcs_ompl.bridge.building import PlannerSpec
 from pbcs_ompl.cli.arguments import environment
 from pbcs_ompl.cli.models import describe
-from pbcs_ompl.cli.terminal import conclude
+from pbcs_ompl.cli.terminal import print_summary
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.registry import load_environments, names
 
@@ -29,7 +29,7 @@ def run(arguments: Namespace) -> int:
         "environments": _environments(),
         "environment": _check(arguments) if arguments.env else None,
     }
-    conclude(result, _closing_lines(result), as_json=arguments.json)
+    print_summary(result, _closing_lines(result), as_json=arguments.json)
     if missing:
         return 3
     return 1 if result["environment"] and not result["environment"]["ok"] else 0

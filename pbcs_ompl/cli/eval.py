@@ -5,7 +5,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from pbcs_ompl.cli.terminal import conclude
+from pbcs_ompl.cli.terminal import print_summary
 from pbcs_ompl.core.formatting import percent, short
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
@@ -32,7 +32,7 @@ def run(arguments: Namespace) -> int:
     if arguments.video:
         write_video(model, chain.rollout(model, epsilon=arguments.epsilon), arguments.video)
         summary["video"] = arguments.video
-    conclude(summary, _closing_lines(arguments, summary), as_json=arguments.json)
+    print_summary(summary, _closing_lines(arguments, summary), as_json=arguments.json)
     return 0 if summary["success_rate"] > 0 else 1
 
 

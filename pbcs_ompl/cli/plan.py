@@ -9,7 +9,7 @@ from pbcs_ompl.cli.arguments import environment
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.models import note_rules
 from pbcs_ompl.cli.pictures import draw_tree
-from pbcs_ompl.cli.terminal import Report, conclude, list_files
+from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.formatting import duration, short
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
@@ -23,14 +23,14 @@ def run(arguments: Namespace) -> int:
     note_rules(model)
     if arguments.video:
         check_video(arguments.video)
-    with Report("plan", budget=arguments.max_transitions, max_seconds=arguments.max_seconds) as report:
+    with ProgressDisplay("plan", budget=arguments.max_transitions, max_seconds=arguments.max_seconds) as display:
         result = plan(model, arguments.planner, planner_kwargs=arguments.planner_kwargs, seed=arguments.seed,
                       max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds, out=out,
-                      on_progress=report)
+                      on_progress=display)
     draw_tree(model, result, out)
     if arguments.video and result.trajectory is not None:
         write_video(model, result.trajectory.states, arguments.video)
-    conclude(result.summary(), _closing_lines(arguments, result, out), as_json=arguments.json)
+    print_summary(result.summary(), _closing_lines(arguments, result, out), as_json=arguments.json)
     return 0 if result.solved else 1
 
 

@@ -3,7 +3,7 @@
 from argparse import Namespace
 from typing import Any
 
-from pbcs_ompl.cli.terminal import conclude
+from pbcs_ompl.cli.terminal import print_summary
 from pbcs_ompl.results.report import write_report
 
 
@@ -15,6 +15,6 @@ def run(arguments: Namespace) -> int:
     failures = [(section.name, reason) for section in sections for _, reason in section.content.failures
                 if section.kind == "damaged"]
     lines = [(folder["kind"], f"{folder['folder']}: {folder['outcome']}") for folder in folders]
-    conclude({"out": str(page), "folders": folders, "damaged": dict(failures)},
+    print_summary({"out": str(page), "folders": folders, "damaged": dict(failures)},
              [*lines, *(("damaged", reason) for _, reason in failures), ("page", str(page))], as_json=arguments.json)
     return 0

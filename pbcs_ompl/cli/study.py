@@ -8,7 +8,7 @@ from typing import Any
 
 from pbcs_ompl.cli.executor import executor
 from pbcs_ompl.cli.folders import fresh_folder
-from pbcs_ompl.cli.terminal import Report, conclude, list_files
+from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import in_words
 from pbcs_ompl.experiments.study import Study, find_study, run_shard, run_study, study_ids
@@ -25,7 +25,7 @@ def run(arguments: Namespace) -> int:
     """Run, analyse, report. Returns 1 when a run failed; claims that are false are an answer, not a failure."""
     if arguments.list:
         titles = study_ids()
-        conclude({"studies": titles}, list(titles.items()), as_json=arguments.json)
+        print_summary({"studies": titles}, list(titles.items()), as_json=arguments.json)
         return 0
     if arguments.id is None:
         raise InvalidOption("the id of a study is missing; pbcs study --list shows them all")
@@ -40,7 +40,7 @@ def run(arguments: Namespace) -> int:
     try:
         return _make(study, arguments, out)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"go on with the same command and --out {out}") from None
+        raise KeyboardInterrupt(f"continue with the same command and --out {out}") from None
 
 
 def _make(study: Study, arguments: Namespace, out: Path) -> int:
@@ -48,9 +48,9 @@ def _make(study: Study, arguments: Namespace, out: Path) -> int:
     settings = run_settings(study, arguments.seeds)
     shard = None if arguments.shard is None else Shard(*arguments.shard)
     budget = len(settings if shard is None else shard.of(settings))
-    with executor(arguments) as jobs, Report(study.id, count="runs", budget=budget) as report:
+    with executor(arguments) as jobs, ProgressDisplay(study.id, count="runs", budget=budget) as display:
         options = {"out": out, "seeds": arguments.seeds, "jobs": jobs, "max_seconds": arguments.max_seconds,
-                   "max_memory": arguments.max_memory, "on_progress": report}
+                   "max_memory": arguments.max_memory, "on_progress": display}
         if shard is None:
             result = run_study(study, **options)
             summary, failed = result.summary(), result.failed
@@ -61,7 +61,7 @@ def _make(study: Study, arguments: Namespace, out: Path) -> int:
                        "out": str(out)}
             lines = [(study.id, f"shard {shard}: {len(records)} of {budget} runs"), *_failures(failed),
                      ("next", "the other shards, then the same command without --shard")]
-    conclude(summary, lines, as_json=arguments.json)
+    print_summary(summary, lines, as_json=arguments.json)
     return 1 if failed else 0
 
 
@@ -80,7 +80,7 @@ def _emit(study: Study, arguments: Namespace, out: Path) -> int:
         else:
             file, following = out / "slurm.sh", f"sbatch {out / 'slurm.sh'}"
             write_text(file, slurm_script(command, len(settings), study.id, out.resolve()))
-    conclude({"id": study.id, "runs": len(settings), "out": str(out), "file": str(file)},
+    print_summary({"id": study.id, "runs": len(settings), "out": str(out), "file": str(file)},
              [(study.id, f"{len(settings)} runs in {file}"), ("next", following)], as_json=arguments.json)
     return 0
 

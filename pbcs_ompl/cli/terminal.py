@@ -28,8 +28,8 @@ class _Bar(Progress):
             yield self.table
 
 
-class Report:
-    """Progress of one run, shown as a live bar on a terminal and as a line now and then elsewhere.
+class ProgressDisplay:
+    """Progress of one run, shown as a live bar on a terminal and as a line every ten seconds elsewhere.
 
     It is called with the plain numbers of a `ProgressCallback`. The time left follows from "covered", the
     share that is done, where it is among them; else from the budgets, and a search usually ends earlier. Where there is
@@ -49,7 +49,7 @@ class Report:
         columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
         self._bar = _Bar(*columns, console=console, transient=True) if console.is_terminal else None
 
-    def __enter__(self) -> "Report":
+    def __enter__(self) -> "ProgressDisplay":
         self._start = self._last_line = time.monotonic()
         if self._bar is not None:
             self._task = self._bar.add_task(self._label, total=None)
@@ -76,7 +76,7 @@ class Report:
             print(text, *rows, sep="\n", file=sys.stderr, flush=True)
 
     def _share(self, numbers: dict[str, Any], seconds: float) -> float | None:
-        """Return how much is done, in [0, 1], None when nobody knows."""
+        """Return the share that is done, in [0, 1]; None if unknown."""
         if "covered" in numbers:
             return float(numbers["covered"])
         shares = [numbers.get(self._count, 0) / self._budget] if self._budget else []
@@ -106,7 +106,7 @@ def _table(rows: Sequence[dict[str, Any]]) -> Table | None:
     return table
 
 
-def conclude(result: dict[str, Any], lines: Sequence[tuple[str, str]], *, as_json: bool) -> None:
+def print_summary(result: dict[str, Any], lines: Sequence[tuple[str, str]], *, as_json: bool) -> None:
     """Print the closing summary, and the JSON object as the last line on stdout if it was asked for."""
     stream = sys.stderr if as_json else sys.stdout
     for name, text in lines:

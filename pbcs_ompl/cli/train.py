@@ -9,7 +9,7 @@ from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.cli.arguments import build_parser, environment
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_chain
-from pbcs_ompl.cli.terminal import Report, conclude, list_files, warn
+from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary, warn
 from pbcs_ompl.core.errors import InvalidOption, TrainingStalled
 from pbcs_ompl.core.formatting import duration, percent, short
 from pbcs_ompl.resettable import make
@@ -33,24 +33,24 @@ def run(arguments: Namespace) -> int:
         result = error.result
     except KeyboardInterrupt:
         if (out / CONFIG).is_file():
-            raise KeyboardInterrupt(f"go on with: pbcs train --resume {shlex.quote(str(out))}") from None
+            raise KeyboardInterrupt(f"continue with: pbcs train --resume {shlex.quote(str(out))}") from None
         raise
     _draw(result, out)
-    conclude(result.summary(), _closing_lines(result, out), as_json=arguments.json)
+    print_summary(result.summary(), _closing_lines(result, out), as_json=arguments.json)
     return 0 if result.solved else 1
 
 
 def _train(arguments: Namespace, out: Path) -> TrainResult:
     budget = {} if arguments.max_transitions is None else {"max_transitions": arguments.max_transitions}
-    with Report("train", budget=arguments.max_transitions) as report:
+    with ProgressDisplay("train", budget=arguments.max_transitions) as display:
         if arguments.resume:
-            return resume(out, on_progress=report, **budget)
+            return resume(out, on_progress=display, **budget)
         trajectory = None if arguments.path is None else _read_trajectory(Path(arguments.path))
         return train(environment(arguments), trajectory=trajectory, out=out,
                      method=arguments.method, planner=arguments.planner, planner_kwargs=arguments.planner_kwargs,
                      agent=arguments.agent, preset=arguments.preset, settings=arguments.settings,
                      agent_settings=arguments.agent_settings, seed=arguments.seed, device=arguments.device,
-                     on_progress=report, **budget)
+                     on_progress=display, **budget)
 
 
 def _refuse_other_options(arguments: Namespace) -> None:

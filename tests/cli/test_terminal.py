@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from pbcs_ompl.cli.folders import fresh_folder
-from pbcs_ompl.cli.terminal import Report, conclude
+from pbcs_ompl.cli.terminal import ProgressDisplay, print_summary
 from pbcs_ompl.core.formatting import duration, short
 
 
@@ -27,7 +27,7 @@ def test_duration(seconds, text):
 
 
 def test_json_is_the_last_line_on_stdout_and_all_there_is(capsys):
-    conclude({"solved": True, "rate": np.float64(0.5)}, [("solved", "in no time")], as_json=True)
+    print_summary({"solved": True, "rate": np.float64(0.5)}, [("solved", "in no time")], as_json=True)
     shown = capsys.readouterr()
     assert json.loads(shown.out) == {"solved": True, "rate": 0.5}
     assert shown.out.count("\n") == 1
@@ -35,16 +35,16 @@ def test_json_is_the_last_line_on_stdout_and_all_there_is(capsys):
 
 
 def test_a_summary_for_people_goes_to_stdout(capsys):
-    conclude({"solved": True}, [("solved", "in no time")], as_json=False)
+    print_summary({"solved": True}, [("solved", "in no time")], as_json=False)
     assert capsys.readouterr().out == "solved    in no time\n"
 
 
 def test_progress_without_a_terminal_is_a_line_now_and_then_with_rate_and_time_left(capsys, monkeypatch):
     clock = iter(range(0, 1000, 6))
     monkeypatch.setattr("pbcs_ompl.cli.terminal.time", SimpleNamespace(monotonic=lambda: float(next(clock))))
-    with Report("plan", budget=1000) as report:
+    with ProgressDisplay("plan", budget=1000) as display:
         for count in (100, 200, 300, 400):
-            report({"transitions": count, "seconds": 0.1})
+            display({"transitions": count, "seconds": 0.1})
     lines = capsys.readouterr().err.splitlines()
     assert lines == ["plan: transitions 200, 16.7 transitions/s, at most 48 s left",
                      "plan: transitions 400, 16.7 transitions/s, at most 36 s left"]
@@ -56,8 +56,8 @@ TABLE = [{"planner": "Ex", "runs": "3/4", "median": 1234.5}, {"planner": "RRT", 
 def test_a_table_without_a_terminal_is_a_line_for_each_row(capsys, monkeypatch):
     clock = iter(range(0, 1000, 20))
     monkeypatch.setattr("pbcs_ompl.cli.terminal.time", SimpleNamespace(monotonic=lambda: float(next(clock))))
-    with Report("compare", count="runs", budget=8) as report:
-        report({"runs": 3, "table": TABLE})
+    with ProgressDisplay("compare", count="runs", budget=8) as display:
+        display({"runs": 3, "table": TABLE})
     assert capsys.readouterr().err.splitlines() == [
         "compare: runs 3, 0.15 runs/s, at most 33 s left", "  planner Ex, runs 3/4, median 1,234",
         "  planner RRT, runs 0/4, median -"]
@@ -66,8 +66,8 @@ def test_a_table_without_a_terminal_is_a_line_for_each_row(capsys, monkeypatch):
 def test_a_table_on_a_terminal_stands_under_the_bar(monkeypatch):
     screen = Console(file=io.StringIO(), force_terminal=True, no_color=True, width=100)
     monkeypatch.setattr("pbcs_ompl.cli.terminal.Console", lambda **_: screen)
-    with Report("compare", count="runs", budget=8) as report:
-        report({"runs": 3, "table": TABLE})
+    with ProgressDisplay("compare", count="runs", budget=8) as display:
+        display({"runs": 3, "table": TABLE})
     plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", screen.file.getvalue())
     shown = [line.split() for line in plain.splitlines()]
     assert ["planner", "runs", "median"] in shown
