@@ -6,7 +6,7 @@ The runs last at least 0.5 s each: EST in a large maze, stopped by its budget. T
 of `plan`, one after the other in this process. The rest of a comparison's wall time is overhead: coverage, records,
 telling the parent, the database; and once the start of the process, its imports and compilers, which is shown apart. So
 is the time beside the search alone, most of which `plan` takes to read the tree out of OMPL. All this needs two cores
-that nobody else uses; the overhead in CPU time, of all processes, less what a comparison of one run takes, does not.
+that nothing else uses; the overhead in CPU time, of all processes, less what a comparison of one run takes, does not.
 """
 
 import resource
@@ -37,7 +37,7 @@ class Timing(NamedTuple):
 
 
 def measure(runs: int, jobs: int) -> Timing:
-    """Compare one planner with so many seeds, as a user does, and look at the clock."""
+    """Compare one planner with `runs` seeds, as a user does, and look at the clock."""
     ends: list[float] = []
 
     def look(numbers: dict[str, Any]) -> None:

@@ -62,7 +62,7 @@ def of_a_step(seeds: int, steps: int) -> dict[str, float]:
 
 
 def bytes_of_a_seed(steps: int) -> dict[str, int]:
-    """Count the tensors of a stack of two whose seeds have made so many steps, for each seed."""
+    """Count the tensors of a stack of two whose seeds have made N steps, for each seed."""
     stack = agent(2)
     vectors, numbers = np.zeros((2, steps, 1)), np.zeros((2, steps))
     stack.remember(vectors, vectors, numbers, vectors, numbers)

@@ -75,8 +75,9 @@ def test_the_first_forty_lines_hold_what_a_visitor_needs():
 
 
 def test_every_folder_of_the_overview_exists():
-    tree = next(block for block in blocks(README, "") if "reset_anywhere/" in block)
-    parents = {"core", "reset_anywhere", "bridge", "agents", "skills", "compare", "diagnostics", "studies", "execution",
-               "figures", "report", "cli"}
-    for name in re.findall(r"^\s*(\w+)/", tree, flags=re.MULTILINE):
-        assert (ROOT / ("pbcs_ompl" if name in parents else "") / name).is_dir(), name
+    tree = next(block for block in blocks(README, "") if "resettable/" in block)
+    named = {("pbcs_ompl/" if indent else "") + name
+             for indent, name in re.findall(r"^( *)(\w+)/", tree, flags=re.MULTILINE)}
+    assert all((ROOT / name).is_dir() for name in named)
+    packages = {f"pbcs_ompl/{path.parent.name}" for path in (ROOT / "pbcs_ompl").glob("*/__init__.py")}
+    assert packages - named == {"pbcs_ompl/planners", "pbcs_ompl/envs"}
