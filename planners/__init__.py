@@ -7,27 +7,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pbcs_ompl.core.tree import Tree
     from pbcs_ompl.planners.est_adapted import ESTAdapted
     from pbcs_ompl.planners.ex import Ex
+    from pbcs_ompl.planners.planner import Strategy, TreePlanner
+    from pbcs_ompl.planners.propagators import PlanningContext
     from pbcs_ompl.planners.random_walk import RandomWalk
     from pbcs_ompl.planners.rrt_nh import RRTNH
     from pbcs_ompl.planners.rrt_steered import RRTSteered
-    from pbcs_ompl.planners.strategy import Space, Strategy
-    from pbcs_ompl.planners.tree import Tree
-    from pbcs_ompl.planners.tree_planner import TreePlanner
 
-__all__ = ["RRTNH", "ESTAdapted", "Ex", "RRTSteered", "RandomWalk", "Space", "Strategy", "Tree",
+__all__ = ["RRTNH", "ESTAdapted", "Ex", "PlanningContext", "RRTSteered", "RandomWalk", "Strategy", "Tree",
            "TreePlanner"]
 
-_HOMES = {"ESTAdapted": "est_adapted", "Ex": "ex", "RandomWalk": "random_walk", "RRTNH": "rrt_nh",
-          "RRTSteered": "rrt_steered", "Space": "strategy", "Strategy": "strategy", "Tree": "tree",
-          "TreePlanner": "tree_planner"}
+_MODULES = {"ESTAdapted": "planners.est_adapted", "Ex": "planners.ex", "PlanningContext": "planners.propagators",
+            "RandomWalk": "planners.random_walk", "RRTNH": "planners.rrt_nh", "RRTSteered": "planners.rrt_steered",
+            "Strategy": "planners.planner", "Tree": "core.tree", "TreePlanner": "planners.planner"}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(import_module(f"pbcs_ompl.{_MODULES[name]}"), name)
+
 
 if __name__ == "planners":  # the folder of a checkout, imported by its own name
     from pbcs_ompl.core.alias import alias_package

@@ -12,8 +12,8 @@ from numba import types
 from numba.core.dispatcher import Dispatcher
 
 from pbcs_ompl.core.errors import CallbackFailed
+from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.planners.tree import Tree
 
 _vector = types.float64[::1]
 _matrix = types.float64[:, ::1]

@@ -1,22 +1,27 @@
 """EST for reinforcement learning: random actions from nodes in sparse regions ([Matheron2020] 3.2)."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
+from pbcs_ompl.core.options import check_positive_numbers
+from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import IndexArray
 from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert
 from pbcs_ompl.planners.kernels.sparse import draw_sparse
-from pbcs_ompl.planners.options import positive
-from pbcs_ompl.planners.strategy import Space, Strategy
-from pbcs_ompl.planners.tree import Tree
-from pbcs_ompl.planners.tree_planner import StrategyPlanner
+from pbcs_ompl.planners.planner import Strategy
+from pbcs_ompl.planners.propagators import PlanningContext
 
 NODES_PER_BATCH = 100
-WIDEST = 4
-"""Beyond this number of features the bins around a bin are too many to look at."""
+MOST_FEATURES = 4
+"""Beyond this number of features the bins around a bin are too many to visit."""
 
 
-class SparseFirst(Strategy):
+class ESTAdapted(Strategy):
     """Draw nodes with probability proportional to 1 / omega(s), omega the number of nodes within d of s.
+
+    Source: [Matheron2020] 3.2.
 
     Differs: for the ball of radius d stand the 3^F bins of edge 2 d / 3 around s's bin, a box of edge 2 d;
     with more than four features, s's bin of edge 2 d alone. And the nodes of a batch (one percent of the
@@ -24,20 +29,24 @@ class SparseFirst(Strategy):
     of their n nodes: that is 1 / n^2 for a node, more eager than the thesis's rule.
 
     Args:
-        distance: d; by default the bin size that the problem suggests, along each feature.
+        distance: d, one for all features or one for each; by default the bin size that the problem suggests.
     """
 
-    def __init__(self, distance: float | None = None):
-        self._distance = None if distance is None else positive("distance", distance)
+    def __init__(self, distance: float | Sequence[float] | None = None):
+        self._given_distance = None if distance is None else check_positive_numbers("distance", distance)
 
-    def start(self, space: Space, rng: np.random.Generator) -> None:
+    def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
         """Begin without bins."""
-        super().start(space, rng)
-        features = len(space.bin_size)
-        distance = np.array(space.bin_size) if self._distance is None else np.full(features, self._distance)
-        self._reach = 1 if features <= WIDEST else 0
-        self._size = 2.0 * distance / (2 * self._reach + 1)
+        super().start(context, rng)
+        self._distance = context.edge_lengths("distance", self._given_distance)
+        features = len(self._distance)
+        self._reach = 1 if features <= MOST_FEATURES else 0
+        self._size = 2.0 * self._distance / (2 * self._reach + 1)
         self._bins = empty_queue(features)
+
+    def resolved(self) -> dict[str, Any]:
+        """Return d for each feature."""
+        return {"distance": self._distance.tolist()}
 
     def batch(self, tree: Tree) -> int:
         """Return one percent of the nodes."""
@@ -53,9 +62,3 @@ class SparseFirst(Strategy):
         """Put the new nodes that are not terminal into their bins."""
         new = slice(first, last)
         self._bins = insert(self._bins, tree.features[new], tree.terminal[new], self._size, first)
-
-
-class ESTAdapted(StrategyPlanner):
-    """EST with random actions as an OMPL planner, for any `ompl.control.SpaceInformation`."""
-
-    strategy_class = SparseFirst

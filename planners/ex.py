@@ -1,27 +1,30 @@
 """Ex: expand the least expanded node of the least expanded bin ([Matheron2020] 3.3)."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.core.types import Array, IndexArray
+from pbcs_ompl.core.options import check_positive_numbers
+from pbcs_ompl.core.tree import Tree
+from pbcs_ompl.core.types import IndexArray
 from pbcs_ompl.planners.compiled import CompiledStep
 from pbcs_ompl.planners.kernels import ex_loop
 from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert, select, tied_bins
-from pbcs_ompl.planners.strategy import Space, Strategy
-from pbcs_ompl.planners.tree import Tree
-from pbcs_ompl.planners.tree_planner import StrategyPlanner
+from pbcs_ompl.planners.planner import Strategy
+from pbcs_ompl.planners.propagators import PlanningContext
 
 
-class LeastExpanded(Strategy):
-    """The choice of [Matheron2020] Alg. 5, in O(1) for any size of the tree.
+class Ex(Strategy):
+    """Expand the least expanded node of the least expanded bin, in O(1) for any size of the tree.
+
+    Source: [Matheron2020] Alg. 5.
 
     Differs: none when nodes are expanded one at a time, as they are wherever the environment's step is
     compiled or `batch=1`. Otherwise as many nodes are selected together as bins are tied for the lowest
-    count: Alg. 5 would select each of these bins before any other too, unless a new bin cuts in. Where the
+    count: Alg. 5 would select each of these bins before any other too, unless a new bin comes first. Where the
     environment keeps several cores busy with p states (`parallel_batch`), it is that number rounded down to a
-    multiple of p, at least p. Larger batches make Ex forget its dives into new bins, which costs transitions.
+    multiple of p, at least p. In larger batches Ex follows new bins less far at once, which costs transitions.
 
     Args:
         bin_size: Edge length of the bins, one for all features or one for each; by default what the problem
@@ -29,19 +32,19 @@ class LeastExpanded(Strategy):
     """
 
     def __init__(self, bin_size: float | Sequence[float] | None = None):
-        self._wanted_size = None if bin_size is None else _checked_size(bin_size)
+        self._given_size = None if bin_size is None else check_positive_numbers("bin_size", bin_size)
         self.queue = empty_queue(1)
         self._size = np.empty(0)
 
-    def start(self, space: Space, rng: np.random.Generator) -> None:
+    def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
         """Begin without bins."""
-        super().start(space, rng)
-        features = len(space.bin_size)
-        size = space.bin_size if self._wanted_size is None else self._wanted_size
-        if len(size) not in (1, features):
-            raise InvalidOption(f"bin_size has {len(size)} numbers; expected 1, or {features}")
-        self._size = np.array(np.broadcast_to(size, features))
-        self.queue = empty_queue(features)
+        super().start(context, rng)
+        self._size = context.edge_lengths("bin_size", self._given_size)
+        self.queue = empty_queue(len(self._size))
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the edges of the bins."""
+        return {"bin_size": self._size.tolist()}
 
     @property
     def nbytes(self) -> int:
@@ -50,7 +53,7 @@ class LeastExpanded(Strategy):
 
     def batch(self, tree: Tree) -> int:
         """Return the number of bins that are tied for the lowest count, in whole portions of `parallel_batch`."""
-        portion = self.space.parallel_batch
+        portion = self.context.parallel_batch
         return max(portion, tied_bins(self.queue) // portion * portion)
 
     def select(self, tree: Tree, count: int) -> IndexArray:
@@ -66,7 +69,7 @@ class LeastExpanded(Strategy):
 
     def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:
         """Expand up to `count` nodes one at a time in compiled code (see `pbcs_ompl.planners.compiled`)."""
-        bounds = np.array([self.space.action_low, self.space.action_high])
+        bounds = np.array([self.context.action_low, self.context.action_high])
         uniforms = self.rng.random((count, 2 + bounds.shape[1]))
         tree.reserve(count)
         done = 0
@@ -83,16 +86,3 @@ class LeastExpanded(Strategy):
             if reason == ex_loop.GOAL:
                 return len(tree) - 1
         return -1
-
-
-class Ex(StrategyPlanner):
-    """Ex as an OMPL planner, for any `ompl.control.SpaceInformation`; options: see LeastExpanded."""
-
-    strategy_class = LeastExpanded
-
-
-def _checked_size(size: float | Sequence[float]) -> Array:
-    numbers = np.atleast_1d(np.asarray(size, dtype=np.float64))
-    if numbers.ndim != 1 or not (np.isfinite(numbers) & (numbers > 0)).all():
-        raise InvalidOption(f"bin_size={size!r}: expected finite numbers above 0")
-    return numbers

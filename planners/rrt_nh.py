@@ -3,17 +3,19 @@
 import numpy as np
 
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import IndexArray
 from pbcs_ompl.planners.kernels import nearest
-from pbcs_ompl.planners.strategy import Space, Strategy
-from pbcs_ompl.planners.tree import Tree
-from pbcs_ompl.planners.tree_planner import StrategyPlanner
+from pbcs_ompl.planners.planner import Strategy
+from pbcs_ompl.planners.propagators import PlanningContext
 
 NODES_PER_BATCH = 100
 
 
-class NearestToRandom(Strategy):
-    """[Matheron2020] Alg. 3 in the feature space (3.4.2): uniform target, nearest node by Euclidean distance.
+class RRTNH(Strategy):
+    """Expand the node nearest to a random point of the feature space, by Euclidean distance.
+
+    Source: [Matheron2020] Alg. 3, in the feature space (3.4.2).
 
     Differs: none with `batch=1`. Otherwise one target for each hundred nodes of the tree is drawn before any
     of their nearest nodes is expanded, so that a target misses at most one percent of the nodes that it
@@ -23,12 +25,12 @@ class NearestToRandom(Strategy):
         InvalidOption: on `start`, for a feature space without finite bounds.
     """
 
-    def start(self, space: Space, rng: np.random.Generator) -> None:
+    def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
         """Begin without points."""
-        super().start(space, rng)
-        if not (np.isfinite(space.feature_low) & np.isfinite(space.feature_high)).all():
+        super().start(context, rng)
+        if not (np.isfinite(context.feature_low) & np.isfinite(context.feature_high)).all():
             raise InvalidOption(f"RRT draws targets from a box, but the explored feature is only bounded by "
-                                f"{space.feature_low.tolist()} and {space.feature_high.tolist()}; "
+                                f"{context.feature_low.tolist()} and {context.feature_high.tolist()}; "
                                 "give the projection bounds, or use Ex")
         self._items = np.empty(1024, np.int32)
         self._size = 0
@@ -51,7 +53,7 @@ class NearestToRandom(Strategy):
 
     def draw_targets(self, count: int) -> np.ndarray:
         """Return random points [count, F] of the feature box."""
-        low, high = self.space.feature_low, self.space.feature_high
+        low, high = self.context.feature_low, self.context.feature_high
         return low + (high - low) * self.rng.random((count, len(low)))
 
     def nearest_to(self, tree: Tree, targets: np.ndarray) -> IndexArray:
@@ -59,9 +61,3 @@ class NearestToRandom(Strategy):
         found = np.empty(len(targets), np.int64)
         nearest.nearest(tree.columns.features, self._items, self._size, targets, found)
         return found
-
-
-class RRTNH(StrategyPlanner):
-    """RRT-NH as an OMPL planner, for any `ompl.control.SpaceInformation` whose projection has bounds."""
-
-    strategy_class = NearestToRandom

@@ -1,7 +1,7 @@
 """OMPL's own control planners as registry entries, and what the installed OMPL cannot build of them.
 
 OMPL draws from one random stream for the whole process: `build` seeds it, and equal seeds give equal paths
-when the problem was built after the seeding too, as `pbcs_ompl.bridge` does.
+when the problem was built after the seeding too, as `pbcs_ompl.plan` does.
 """
 
 from collections.abc import Callable
@@ -9,13 +9,17 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
+import numpy as np
+from ompl import base as ob
 from ompl import control as oc
 from ompl import util as ou
 
-from pbcs_ompl.bridge.problem import quiet_ompl
-from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable
-from pbcs_ompl.planners.grid_decomposition import grid_over
-from pbcs_ompl.planners.options import check_names, positive_integer
+from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable, UnsupportedSpace
+from pbcs_ompl.core.ompl_access import quiet_ompl
+from pbcs_ompl.core.options import check_names, check_positive_integer
+
+GRID_CELLS = 32
+GRID_PROBES = 16
 
 
 @dataclass(frozen=True)
@@ -24,39 +28,50 @@ class StockPlanner:
 
     Attributes:
         name: The class in `ompl.control`.
-        options: The setter and the default of each option; None leaves OMPL's own.
+        setters: The setter and the default of each option; None leaves OMPL's own.
         decomposition: Makes the second argument of the constructor from the space information, if there is
             one.
     """
 
     name: str
-    options: dict[str, tuple[str, Any]] = field(default_factory=dict)
+    setters: dict[str, tuple[str, Any]] = field(default_factory=dict)
     decomposition: Callable[[Any], Any] | None = None
+
+    def options(self) -> dict[str, Any]:
+        """Return the options that the installed OMPL offers, with their defaults.
+
+        `control_duration` is the most steps that a control lasts; OMPL draws 1 to this many.
+        """
+        offered = dir(oc.__dict__.get(self.name))
+        own = {option: default for option, (setter, default) in self.setters.items() if setter in offered}
+        return {**own, "control_duration": 1}
 
     def build(self, si: Any, *, seed: int, **options: Any) -> Any:
         """Return a new planner on an `ompl.control.SpaceInformation`.
 
-        Every planner has the option `hold`: OMPL holds each control for 1 to so many steps.
+        Args:
+            si: The problem.
+            seed: The seed of OMPL's random numbers.
+            options: See `options`.
 
         Raises:
             PlannerUnavailable: the installed OMPL cannot build it.
             InvalidOption: it has no such option, at least in the installed OMPL, or refuses the value.
         """
-        kind = getattr(oc, self.name, None)
+        kind = oc.__dict__.get(self.name)
         if kind is None:
             raise PlannerUnavailable(f"the installed OMPL {version('ompl')} has no {self.name} in Python")
-        offered = {option: setter for option, (setter, _) in self.options.items() if hasattr(kind, setter)}
-        check_names(self.name, options, [*offered, "hold"])
-        hold = positive_integer("hold", options.get("hold", 1))
+        check_names(f"planner {self.name!r}", "option", options, self.options())
+        values = {**self.options(), **options}
+        duration = check_positive_integer("control_duration", values.pop("control_duration"))
         with quiet_ompl():
-            if hold > 1:
-                si.setMinMaxControlDuration(1, hold)
+            if duration > 1:
+                si.setMinMaxControlDuration(1, duration)
             ou.RNG.setSeed(max(1, seed))
             planner = self._construct(kind, si)
-            for option, setter in offered.items():
-                value = options.get(option, self.options[option][1])
+            for option, value in values.items():
                 if value is not None:
-                    _set(planner, self.name, option, setter, value)
+                    _set(planner, self.name, option, self.setters[option][0], value)
         return planner
 
     def _construct(self, kind: Any, si: Any) -> Any:
@@ -74,6 +89,51 @@ def _set(planner: Any, name: str, option: str, setter: str, value: Any) -> None:
     except TypeError as error:
         reason = str(error).splitlines()[0]
         raise InvalidOption(f"planner {name!r} refused {option}={value!r}: {reason}") from error
+
+
+class PositionGrid(oc.GridDecomposition):  # type: ignore[misc] # OMPL's classes have no types
+    """The grid that OMPL's Syclop planners need, over the first two dimensions of a real-vector state space."""
+
+    def __init__(self, bounds: Any):
+        super().__init__(GRID_CELLS, 2, bounds)
+
+    def project(self, state: Any, coordinates: Any) -> None:
+        """Write the position of `state` into `coordinates` [2]."""
+        coordinates[0], coordinates[1] = state[0], state[1]
+
+    def sampleFullState(self, sampler: Any, coordinates: Any, state: Any) -> None:
+        """Draw a state at the position `coordinates` [2]."""
+        sampler.sampleUniform(state)
+        state[0], state[1] = coordinates[0], coordinates[1]
+
+
+def grid_over(si: Any) -> Any:
+    """Return a grid over the positions of an `ompl.control.SpaceInformation`.
+
+    Raises:
+        UnsupportedSpace: the state space is not a real-vector space of two dimensions or more.
+        PlannerUnavailable: OMPL does not call `project` of a Python class, so that all states lie in one region.
+    """
+    space = si.getStateSpace()
+    if not isinstance(space, ob.RealVectorStateSpace) or space.getDimension() < 2:
+        raise UnsupportedSpace(f"a {type(space).__name__}: Syclop's grid expects a real-vector space of two "
+                               "dimensions or more")
+    whole = space.getBounds()
+    bounds = ob.RealVectorBounds(2)
+    for axis in (0, 1):
+        bounds.setLow(axis, whole.low[axis])
+        bounds.setHigh(axis, whole.high[axis])
+    grid = PositionGrid(bounds)
+    state, regions = si.allocState(), set()
+    low, high = np.array(whole.low[:2]), np.array(whole.high[:2])
+    for part in range(GRID_PROBES):
+        state[0], state[1] = (low + (high - low) * (part + 0.5) / GRID_PROBES).tolist()
+        regions.add(grid.locateRegion(state))
+    if len(regions) < GRID_PROBES:
+        raise PlannerUnavailable(f"the installed OMPL {version('ompl')} cannot run Syclop planners from "
+                                 "Python: its binding does not call GridDecomposition.project; use Ex, RRT, EST or "
+                                 "KPIECE1")
+    return grid
 
 
 RRT = StockPlanner("RRT", {

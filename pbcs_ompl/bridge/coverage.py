@@ -8,8 +8,8 @@ from time import perf_counter
 import numpy as np
 from numba import njit
 
-from pbcs_ompl.bridge.tree import TreeArrays
 from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Array, Counter, IndexArray
 
 Step = Callable[[list[float], list[float]], list[float]]
@@ -37,10 +37,10 @@ class Coverage:
     share: Array
 
 
-class Trace:
-    """What is taken down while a planner searches, so that its coverage can be worked out afterwards.
+class TransitionRecorder:
+    """Records what a planner does, so that its coverage can be computed afterwards.
 
-    A tree that has a node for every transition tells all but the times. OMPL's own planners keep fewer nodes, or in
+    A tree that has a node for every transition lacks only the times. OMPL's own planners keep fewer nodes, or in
     another order; for them every state that the propagator produces is copied (8 bytes a dimension).
     """
 
@@ -50,7 +50,7 @@ class Trace:
         self._counts, self._seconds = [0], [0.0]
 
     def recording(self, step: Step) -> Step:
-        """Return `step` with a copy taken of every state that it produces."""
+        """Return `step` that also copies every state it produces."""
         copy = self._values.extend
 
         def recorded(state: list[float], control: list[float]) -> list[float]:
@@ -61,7 +61,7 @@ class Trace:
         return recorded
 
     def timed(self, stop: Callable[[], bool], counter: Counter) -> Callable[[], bool]:
-        """Return `stop`, which a planner polls, with the time taken about ten times a decade of transitions."""
+        """Return `stop`, which a planner polls, that also records the time, about ten times a decade of transitions."""
         began, due = perf_counter(), 1.0
 
         def timed_stop() -> bool:
@@ -74,7 +74,7 @@ class Trace:
 
         return timed_stop
 
-    def coverage(self, tree: TreeArrays, transitions: int, seconds: float) -> Coverage | None:
+    def coverage(self, tree: Tree, transitions: int, seconds: float) -> Coverage | None:
         """Return the coverage of a search that has ended; None when its states are not known one by one.
 
         Args:

@@ -3,42 +3,82 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple
 
 import gymnasium
 from ompl import base as ob
 
-from pbcs_ompl.bridge.building import PlannerSpec
-from pbcs_ompl.bridge.coverage import Trace
-from pbcs_ompl.bridge.path import to_trajectory
-from pbcs_ompl.bridge.problem import Problem, make_problem, quiet_ompl
-from pbcs_ompl.bridge.result import PlanResult
-from pbcs_ompl.bridge.stopping import Limits, checked_limits, interruptible, make_stop
-from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.bridge.tree import TreeArrays, tree_of
-from pbcs_ompl.bridge.versions import planning_versions
-from pbcs_ompl.bridge.watch import failure
+from pbcs_ompl.bridge.coverage import Coverage, TransitionRecorder
+from pbcs_ompl.bridge.planner_spec import PlannerSpec
+from pbcs_ompl.bridge.problem import Problem, make_problem
+from pbcs_ompl.bridge.termination import Limits, checked_limits, interruptible, make_stop
+from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory
+from pbcs_ompl.bridge.tree import save_tree, tree_of
+from pbcs_ompl.core.callbacks import callback_failed
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.interfaces import BatchPlanner, ResettableModel
+from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.registry import load_environments
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.folder import CONFIG, PROVENANCE, RESULT, RunFolder
+from pbcs_ompl.results.provenance import planning_versions
 
 TRAJECTORY = "trajectory.npz"
 TREE = "tree.npz"
 
 
-@runtime_checkable
-class HoldsError(Protocol):
-    """A planner that keeps an exception of its strategy instead of raising it through OMPL."""
+@dataclass(frozen=True, eq=False)
+class PlanResult:
+    """What one planner found, with its evidence.
 
-    @property
-    def error(self) -> Any: ...
+    Attributes:
+        solved: Whether the goal was reached, exactly.
+        transitions: Environment steps that were made.
+        collision_checks: How often the environment was asked whether something collides: by every transition, and
+            by every state that OMPL made up itself.
+        seconds: Wall time of the search alone.
+        nodes: Size of the tree.
+        path_length: Steps of the trajectory; None when unsolved.
+        replay_ok: Whether the trajectory, replayed in a fresh environment, gives the same states bit for
+            bit; None when unsolved. False is a failure of the planner or a sign that the environment is not
+            deterministic.
+        planner, env, seed: What was run.
+        planner_settings: Every option of the planner with the value in use.
+        out: The folder with the files, None when none was asked for.
+        trajectory: The path found, None when unsolved.
+        tree: What was explored.
+        coverage: How much of the feature space was seen after how many transitions; None unless asked for.
+    """
+
+    solved: bool
+    transitions: int
+    collision_checks: int
+    seconds: float
+    nodes: int
+    path_length: int | None
+    replay_ok: bool | None
+    planner: str
+    env: str
+    seed: int
+    out: str | None
+    planner_settings: dict[str, Any]
+    trajectory: Trajectory | None
+    tree: Tree
+    coverage: Coverage | None = None
+
+    def summary(self) -> dict[str, Any]:
+        """Return the plain numbers and words, without settings and arrays."""
+        return {"solved": self.solved, "transitions": self.transitions, "collision_checks": self.collision_checks,
+                "seconds": self.seconds, "nodes": self.nodes, "path_length": self.path_length,
+                "replay_ok": self.replay_ok, "planner": self.planner, "env": self.env, "seed": self.seed,
+                "out": self.out}
 
 
 def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "Ex", *,
@@ -55,8 +95,8 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
 
     Args:
         env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model.
-        planner: A registered name, `module:attribute`, an `ompl.base.Planner` class, or a factory
-            (a strategy class is one).
+        planner: A registered name or `module:attribute`, an `ompl.base.Planner` class, or a factory, such as a strategy
+            class (see `PlannerSpec`).
         env_kwargs: Options of the environment, when `env` is an id.
         planner_kwargs: Options of the planner.
         goal, feature, start_seed: See `pbcs_ompl.make`.
@@ -64,7 +104,7 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
         max_transitions: The most environment steps.
         max_seconds: The most wall time of the search; None for any.
         out: A new folder for config.toml, result.json, tree.npz and, when solved, trajectory.npz.
-        coverage: Tell how much of the feature space was seen after how many transitions, in the result's `coverage`.
+        coverage: Report how much of the feature space was seen after how many transitions, in the result's `coverage`.
         on_progress: Called a few times a second with {"transitions", "seconds"}.
 
     Raises:
@@ -77,70 +117,80 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
     model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
     spec = PlannerSpec(planner, planner_kwargs or {})
     with _new_folder(out) as folder:
-        counter = Counter(limits.max_transitions)
-        trace = Trace(model) if coverage else None
-        with quiet_ompl(), make_problem(model, seed=seed, counter=counter, trace=trace) as problem:
-            trajectory, tree, seconds = _search(problem, spec, seed, limits, on_progress)
+        recorder = TransitionRecorder(model) if coverage else None
+        with quiet_ompl(), make_problem(model, seed=seed, counter=Counter(limits.max_transitions),
+                                        recorder=recorder) as problem:
+            found = _search(problem, spec, seed, limits, on_progress)
+        trajectory, transitions = found.trajectory, problem.callbacks.counter.count
         result = PlanResult(
-            solved=trajectory is not None, transitions=counter.count,
-            collision_checks=counter.count + problem.watch.validity_checks, seconds=seconds, nodes=len(tree.states),
-            path_length=None if trajectory is None else trajectory.length,
+            solved=trajectory is not None, transitions=transitions,
+            collision_checks=transitions + problem.callbacks.validity_checks, seconds=found.seconds,
+            nodes=len(found.tree), path_length=None if trajectory is None else trajectory.length,
             replay_ok=None if trajectory is None else trajectory.replays_exactly(_fresh(model)),
             planner=spec.name, env=model.spec.id, seed=seed, out=None if out is None else str(out),
-            trajectory=trajectory, tree=tree,
-            coverage=None if trace is None else trace.coverage(tree, counter.count, seconds))
+            planner_settings=found.settings, trajectory=trajectory, tree=found.tree,
+            coverage=None if recorder is None else recorder.coverage(found.tree, transitions, found.seconds))
         if folder is not None:
-            _write(folder, result, model, spec, limits)
+            _write(folder, result, model, limits)
     return result
 
 
+class _Found(NamedTuple):
+    """What a search leaves: the trajectory (None when the goal was not reached), the tree, the planner's settings."""
+
+    trajectory: Trajectory | None
+    tree: Tree
+    settings: dict[str, Any]
+    seconds: float
+
+
 def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
-            on_progress: ProgressCallback | None) -> tuple[Trajectory | None, TreeArrays, float]:
-    """Return the trajectory (None when the goal was not reached), the tree, and the seconds of the search."""
-    setup, model, watch = problem.setup, problem.model, problem.watch
+            on_progress: ProgressCallback | None) -> _Found:
+    setup, model, callbacks = problem.setup, problem.model, problem.callbacks
     planner = spec.build(problem.space_information, SeedTree(seed).child("planner").integer())
     if isinstance(planner, BatchPlanner):
-        planner.use_model(model, watch.counter)
+        planner.use_model(model, callbacks.counter)
     setup.setPlanner(planner)
     setup.setup()
-    stop = make_stop(watch, limits.max_seconds, on_progress)
-    if watch.trace is not None:
-        stop = watch.trace.timed(stop, watch.counter)
-    with interruptible(lambda: watch.fail(KeyboardInterrupt())):
+    stop = make_stop(callbacks, limits.max_seconds, on_progress)
+    if callbacks.recorder is not None:
+        stop = callbacks.recorder.timed(stop, callbacks.counter)
+    with interruptible(lambda: callbacks.fail(KeyboardInterrupt())):
         began = time.perf_counter()
         try:
             planner.solve(ob.PlannerTerminationCondition(stop))
         except PbcsError:
             raise
         except Exception as error:
-            raise failure(error) from error
+            raise callback_failed(error) from error
         seconds = time.perf_counter() - began
-    if isinstance(planner, HoldsError) and isinstance(planner.error, BaseException):
-        watch.fail(planner.error)
-    watch.raise_error()
-    tree = tree_of(planner, model, problem.space_information)
-    return _solution(problem, spec, seed), tree, seconds
+    if isinstance(planner, BatchPlanner) and planner.error is not None:
+        callbacks.fail(planner.error)
+    callbacks.raise_error()
+    tree = tree_of(planner, problem.space_information)
+    return _Found(_solution(problem, spec, seed), tree, spec.settings(planner), seconds)
 
 
 def _solution(problem: Problem, spec: PlannerSpec, seed: int) -> Trajectory | None:
-    """Return the planner's path if it ends in the goal: planners also hand out approximate ones."""
+    """Return the planner's path if it ends in the goal: planners also report approximate ones."""
     setup, model = problem.setup, problem.model
     if not setup.haveExactSolutionPath():
         return None
-    trajectory = to_trajectory(setup.getSolutionPath(), model, planner=spec.name, seed=seed)
+    trajectory = to_trajectory(setup.getSolutionPath(), problem.space_information, model, planner=spec.name,
+                               seed=seed)
     reached = model.goal_distance(trajectory.states[-1:])[0] < model.goal_threshold
     return trajectory if reached else None
 
 
 def _fresh(model: ResettableModel) -> ResettableModel:
-    """Return a new environment of the same kind; the same one when nobody can build another."""
+    """Return a new environment of the same kind; the same one where no other can be built."""
     load_environments()
     return make(model.spec) if model.spec.id in gymnasium.registry else model
 
 
 @contextmanager
 def _new_folder(out: str | Path | None) -> Iterator[RunFolder | None]:
-    """Open the result folder; when the run fails, take away what it has written."""
+    """Open the result folder; when the run fails, remove what it has written."""
     if out is None:
         yield None
         return
@@ -158,12 +208,12 @@ def _new_folder(out: str | Path | None) -> Iterator[RunFolder | None]:
             raise
 
 
-def _write(folder: RunFolder, result: PlanResult, model: ResettableModel, spec: PlannerSpec,
-           limits: Limits) -> None:
+def _write(folder: RunFolder, result: PlanResult, model: ResettableModel, limits: Limits) -> None:
     if result.trajectory is not None:
         result.trajectory.save(folder.path / TRAJECTORY)
-    result.tree.save(folder.path / TREE)
+    save_tree(result.tree, folder.path / TREE)
     folder.write_config({
-        "kind": "plan", "planner": spec.name, "seed": result.seed, **limits._asdict(),
-        "environment": model.spec.to_dict(), "planner_kwargs": spec.options, "versions": planning_versions()})
+        "kind": "plan", "planner": result.planner, "seed": result.seed, **limits._asdict(),
+        "environment": model.spec.to_dict(), "planner_kwargs": result.planner_settings,
+        "versions": planning_versions()})
     folder.write_result(result.summary())

@@ -1,14 +1,37 @@
 """The environment as OMPL spaces: distance and projection speak of the feature, states stay complete."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from ompl import base as ob
 from ompl import control as oc
 
-from pbcs_ompl.bridge.layout import Block, blocks, state_reader
 from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.ompl_access import value_reader
 from pbcs_ompl.core.types import Array
+
+
+class Block(NamedTuple):
+    """A run of consecutive state dimensions that is one real-vector space."""
+
+    start: int
+    stop: int
+    explored: bool
+    """Whether the dimensions are part of the feature."""
+
+
+def blocks(state_size: int, feature_dims: tuple[int, ...] | None) -> list[Block]:
+    """Cut the dimensions of a state into runs inside and outside the feature, in their own order.
+
+    Because the order is kept, the subspaces of the OMPL state one after the other are the state vector.
+    Without `feature_dims` the feature is not a selection of dimensions, and all of them are one run.
+    """
+    if feature_dims is None:
+        return [Block(0, state_size, True)]
+    explored = [dim in feature_dims for dim in range(state_size)]
+    cuts = [dim for dim in range(1, state_size) if explored[dim] != explored[dim - 1]]
+    return [Block(start, stop, explored[start])
+            for start, stop in zip([0, *cuts], [*cuts, state_size], strict=True)]
 
 
 def make_state_space(model: ResettableModel) -> Any:
@@ -42,13 +65,12 @@ def make_control_space(state_space: Any, model: ResettableModel) -> Any:
     return space
 
 
-class FeatureProjection(ob.ProjectionEvaluator):
+class FeatureProjection(ob.ProjectionEvaluator):  # type: ignore[misc] # OMPL's classes have no types
     """The projection of a state on a feature that OMPL's own evaluators cannot express."""
 
     def __init__(self, space: Any, model: ResettableModel):
         super().__init__(space)
-        parts = blocks(len(model.state_low), model.feature_dims)
-        self._read = state_reader(parts)
+        self._read = value_reader(space)
         self._feature = model.feature
         self._size = len(model.bin_size)
         self.inferCellSizes()  # OMPL refuses to set the size of a cell before it has guessed one

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.bridge.versions import environment_versions
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.ompl_access import path_control, value_reader
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.results.folder import read_arrays, write_arrays
+from pbcs_ompl.results.provenance import environment_versions
 
 FORMAT = 2
 
@@ -25,7 +26,7 @@ class Trajectory:
     Attributes:
         environment: What makes the model that it was found in.
         states: States [T+1, D], the first is the start.
-        actions: Actions [T, A], each held for one step.
+        actions: Actions [T, A], one for each step.
         rewards: Rewards [T].
         planner, seed: Where the trajectory comes from.
         versions: Versions of the packages the steps depend on.
@@ -73,7 +74,7 @@ class Trajectory:
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise DamagedFile(f"{path} is not a trajectory: its metadata do not parse ({error})") from error
         if version != FORMAT:
-            raise DamagedFile(f"{path} has format {version}, this of pbcs_ompl reads format {FORMAT}: "
+            raise DamagedFile(f"{path} has format {version}, this version of pbcs_ompl reads format {FORMAT}: "
                               "plan again, or install the version that wrote it")
         return cls._checked(path, words, arrays)
 
@@ -115,3 +116,49 @@ class Trajectory:
             if installed.get(package) != version:
                 raise Mismatch(f"the trajectory was made with {package} {version}, installed is "
                                f"{installed.get(package, 'none')}; plan again, or install that version")
+
+
+def to_trajectory(path: Any, space_information: Any, model: ResettableModel, *, planner: str = "",
+                  seed: int = 0) -> Trajectory:
+    """Return the trajectory of a PathControl.
+
+    A control that lasts k steps becomes k actions, and the states in between come from stepping the model.
+    The path's own states are kept as they are, true or not: `Trajectory.replays_exactly` tests them.
+
+    Args:
+        path: An `ompl.control.PathControl` of the model's problem.
+        space_information: That problem's `ompl.control.SpaceInformation`.
+        model: The environment.
+        planner, seed: Kept in the trajectory.
+
+    Raises:
+        Mismatch: a control lasts something else than a positive number of whole steps.
+    """
+    read = value_reader(space_information.getStateSpace())
+    read_control = value_reader(space_information.getControlSpace())
+    step_size = space_information.getPropagationStepSize()
+    states, actions = [np.array(read(path.getState(0)))], []
+    for index in range(path.getControlCount()):
+        steps = _whole_steps(path.getControlDuration(index), step_size)
+        action = np.array(read_control(path.getControl(index)))
+        for _ in range(steps - 1):
+            states.append(model.transition(states[-1][None], action[None]).states[0])
+        states.append(np.array(read(path.getState(index + 1))))
+        actions += [action] * steps
+    all_states = np.array(states)
+    all_actions = np.array(actions).reshape(len(actions), len(model.action_low))
+    rewards = model.transition(all_states[:-1], all_actions).rewards if actions else np.empty(0)
+    return Trajectory(environment=model.spec, states=all_states, actions=all_actions,
+                      rewards=np.asarray(rewards, dtype=np.float64), planner=planner, seed=seed)
+
+
+def to_path(trajectory: Trajectory, space_information: Any) -> Any:
+    """Return the PathControl of a trajectory, with one control for each step."""
+    return path_control(space_information, trajectory.states, trajectory.actions)
+
+
+def _whole_steps(duration: float, step_size: float) -> int:
+    steps = round(duration / step_size)
+    if steps < 1 or abs(duration - steps * step_size) > 1e-9 * step_size:
+        raise Mismatch(f"a control of the path lasts {duration}; expected a multiple of {step_size}")
+    return steps

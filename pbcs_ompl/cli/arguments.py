@@ -223,7 +223,7 @@ def _add_environment(verb: Parser, *, required: bool = True, several: bool = Fal
 def _add_planner(verb: Parser) -> None:
     verb.add_argument("--planner", default="Ex", metavar="NAME", help="a registered one or module:Class (Ex)")
     verb.add_argument("--planner-kwargs", type=json_object, default={}, metavar="JSON",
-                      help="options of the planner, such as '{\"hold\": 10}'")
+                      help="options of the planner, such as '{\"control_duration\": 10}'")
 
 
 def _add_seed(verb: Parser) -> None:

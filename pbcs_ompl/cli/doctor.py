@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from platform import platform, python_version
 from typing import Any
 
-from pbcs_ompl.bridge.building import PlannerSpec
+from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.cli.arguments import environment
 from pbcs_ompl.cli.models import describe
 from pbcs_ompl.cli.terminal import print_summary

@@ -8,6 +8,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Array, BoolArray, Capability, Counter, Transition
 
 
@@ -125,7 +127,22 @@ class VectorisedEnv(Protocol):
 
 @runtime_checkable
 class BatchPlanner(Protocol):
-    """A planner that can propagate many states together when the environment allows it."""
+    """An OMPL planner that can propagate many states of a model together, and that keeps its tree and its error."""
+
+    @property
+    def tree(self) -> Tree | None:
+        """The tree as arrays; None before `solve`."""
+        ...
+
+    @property
+    def error(self) -> PbcsError | None:
+        """What ended the last `solve` abnormally: exceptions must not cross OMPL."""
+        ...
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Every option with its value."""
+        ...
 
     def use_model(self, model: ResettableModel, counter: Counter) -> None:
         """Propagate through `model` from now on, and count every transition in `counter`."""
@@ -134,7 +151,11 @@ class BatchPlanner(Protocol):
 
 @runtime_checkable
 class PlannerFactory(Protocol):
-    """A registry entry that is not itself an `ompl.base.Planner` class: it builds one."""
+    """What builds a planner and is not itself an `ompl.base.Planner` class."""
+
+    def options(self) -> dict[str, Any]:
+        """Return every option with its default; None where the planner decides."""
+        ...
 
     def build(self, si: Any, *, seed: int, **options: Any) -> Any:
         """Return a new planner for the space information `si`."""

@@ -3,7 +3,10 @@
 from collections.abc import Collection, Mapping
 from typing import Any
 
+import numpy as np
+
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
+from pbcs_ompl.core.types import Array
 
 
 def check_names(owner: str, kind: str, given: Collection[str], known: Collection[str]) -> None:
@@ -55,3 +58,29 @@ def check_types(values: Mapping[str, Any], types: Mapping[str, type]) -> None:
         allowed = (int, float) if wanted is float else wanted
         if not isinstance(value, allowed) or (isinstance(value, bool) and wanted is not bool):
             raise InvalidOption(f"{name} is {value!r}; expected {wanted.__name__}")
+
+
+def check_positive_integer(name: str, value: Any) -> int:
+    """Return `value`.
+
+    Raises:
+        InvalidOption: it is not an integer above 0.
+    """
+    check_range(name, value, isinstance(value, int) and not isinstance(value, bool) and value > 0,
+                "an integer above 0")
+    return int(value)
+
+
+def check_positive_numbers(name: str, value: Any) -> Array:
+    """Return a number, or a list of some, as an array [K].
+
+    Raises:
+        InvalidOption: one of them is not a finite number above 0.
+    """
+    try:
+        numbers = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    except (TypeError, ValueError):
+        numbers = np.zeros(1)
+    check_range(name, value, numbers.ndim == 1 and bool((np.isfinite(numbers) & (numbers > 0)).all()),
+                "finite numbers above 0")
+    return numbers

@@ -6,6 +6,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 PACKAGES = ("pbcs-ompl", "ompl", "numpy", "scipy", "numba", "gymnasium", "python-fcl", "torch", "mujoco")
+ENVIRONMENT = ("pbcs-ompl", "gymnasium", "mujoco")
+PLANNING = ("ompl", "numpy", "numba", "python-fcl")
 
 
 def installed(packages: tuple[str, ...]) -> dict[str, str]:
@@ -17,6 +19,16 @@ def installed(packages: tuple[str, ...]) -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
+
+
+def environment_versions() -> dict[str, str]:
+    """Return the versions that a trajectory depends on: ours, Gymnasium's, and MuJoCo's where installed."""
+    return installed(ENVIRONMENT)
+
+
+def planning_versions() -> dict[str, str]:
+    """Return the versions that a plan depends on."""
+    return installed((*ENVIRONMENT, *PLANNING))
 
 
 def provenance() -> dict[str, str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pbcs_ompl.agents.update import choose_device
-from pbcs_ompl.bridge.building import PlannerSpec
+from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.core.errors import InvalidOption, UnknownName
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.skills.agent_door import Agent, load_agent

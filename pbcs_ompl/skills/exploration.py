@@ -23,7 +23,7 @@ class Transitions:
 
 
 def explore(model: ResettableModel, count: int, seed: int) -> Transitions:
-    """Explore `count` transitions with Ex, whether or not the goal is found on the way.
+    """Explore `count` transitions with Ex (Alg. 5, one node at a time), whether or not the goal is found on the way.
 
     Rewards are the environment's own. A transition is terminal as those of `Episodes` are.
 
@@ -34,10 +34,8 @@ def explore(model: ResettableModel, count: int, seed: int) -> Transitions:
     """
     if count < 1:
         raise InvalidOption(f"an exploration of {count} transitions, expected at least 1")
-    tree = plan(without_goal(model), "Ex", seed=seed, max_transitions=count).tree
+    tree = plan(without_goal(model), "Ex", planner_kwargs={"batch": 1}, seed=seed, max_transitions=count).tree
     children = np.flatnonzero(tree.parents >= 0)
-    if tree.controls is None:
-        raise InvalidOption("the planner tells no controls")
     states, controls = tree.states[tree.parents[children]], tree.controls[children]
     outcome = model.transition(states, controls)  # a tree has no rewards: ask again, it is the same answer
     return Transitions(states, controls, outcome.rewards, outcome.states, outcome.terminated | outcome.success)

@@ -5,12 +5,13 @@ from typing import Any
 
 import gymnasium
 
-from pbcs_ompl.bridge.building import PlannerSpec
-from pbcs_ompl.bridge.problem import make_problem, quiet_ompl
+from pbcs_ompl.bridge.planner_spec import PlannerSpec
+from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, RunFolderError, TrainingStalled, UnknownName
 from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule

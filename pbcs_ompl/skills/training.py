@@ -10,14 +10,14 @@ import numpy as np
 
 from pbcs_ompl.agents.update import one_thread
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.bridge.stopping import interruptible
+from pbcs_ompl.bridge.termination import interruptible
 from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.bridge.versions import planning_versions
 from pbcs_ompl.core.errors import CallbackFailed, Mismatch, PbcsError
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.results.folder import RunFolder, read_json, write_json
+from pbcs_ompl.results.provenance import planning_versions
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.checkpoint import read_checkpoint, write_checkpoint
 from pbcs_ompl.skills.config import METHODS, WITHOUT_PLAN, TrainConfig

@@ -2,7 +2,7 @@
 
 Differs from [Matheron2020] Alg. 5: the hash tables W_b, B_s, B_m of lists become sorted slices of two arrays
 (see `runs`), one for the bins and one pool for the nodes of all bins. A bin's slice has room for a power of
-two of rows; when it is full it moves to a slice of twice the size, and its old slice waits in a free list for
+two of rows; when it is full it moves to a slice of twice the size, and its old slice is put into a free list for
 another bin.
 """
 
@@ -12,17 +12,17 @@ import numpy as np
 from numba import njit, types
 from numpy.typing import NDArray
 
+from pbcs_ompl.core.tree import GROWTH, resized_copy
 from pbcs_ompl.planners.kernels.runs import LENGTH, LOWEST, MEMBER, SIZE, START, append, choose
 
 SMALLEST = 2  # log2 of the rows of a new bin's slice
 CLASSES = 32  # slice sizes 2**0 .. 2**31
-GROWTH = 4  # of the arrays; rooms cost address space only
 FARTHEST = 4.6e18  # cells beyond this coordinate are one cell: int64 ends there
 Number = int | np.int64
 
 
 class BinQueue(NamedTuple):
-    """The arrays. R rows of the pool, M rooms for bins, F features, H hash cells (a power of two)."""
+    """The arrays. R rows of the pool, M rows for bins, F features, H hash cells (a power of two)."""
 
     pool: NDArray[np.int32]
     """Node queues of all bins [R, 3]; a free slice's first row is the next free slice of its size, or -1."""
@@ -39,7 +39,7 @@ class BinQueue(NamedTuple):
     free: NDArray[np.int32]
     """First free slice of each size, -1 for none [CLASSES]."""
     used: NDArray[np.int64]
-    """Pool rows ever given away [1]."""
+    """Pool rows ever used [1]."""
 
     @property
     def num_bins(self) -> int:
@@ -48,7 +48,7 @@ class BinQueue(NamedTuple):
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays; rooms that were never written to are not counted."""
+        """Bytes of all arrays; rows that were never written to are not counted."""
         by_bin = self.heads, self.order, self.cells
         return (self.pool[:self.used[0]].nbytes + sum(array[:self.num_bins].nbytes for array in by_bin)
                 + self.table.nbytes + self.head.nbytes + self.free.nbytes + self.used.nbytes)
@@ -62,12 +62,12 @@ QUEUE_TYPE = types.NamedTuple((_entries, _entries, _entries, _entries, _integers
 
 
 def empty_queue(num_features: int) -> BinQueue:
-    """Return a queue without bins; its rooms cost no memory until they are written to."""
-    rooms, rows = 1 << 14, 1 << 16
+    """Return a queue without bins; its rows cost no memory until they are written to."""
+    bins, rows = 1 << 14, 1 << 16
     return BinQueue(
-        pool=np.empty((rows, 3), np.int32), heads=np.empty((rooms, 4), np.int32),
-        order=np.empty((rooms, 3), np.int32), head=np.zeros((1, 4), np.int32),
-        cells=np.empty((rooms, num_features), np.int64), table=np.zeros(4 * rooms, np.int32),
+        pool=np.empty((rows, 3), np.int32), heads=np.empty((bins, 4), np.int32),
+        order=np.empty((bins, 3), np.int32), head=np.zeros((1, 4), np.int32),
+        cells=np.empty((bins, num_features), np.int64), table=np.zeros(4 * bins, np.int32),
         free=np.full(CLASSES, -1, np.int32), used=np.zeros(1, np.int64))
 
 
@@ -215,21 +215,15 @@ def _grow(queue: BinQueue) -> BinQueue:
     """Return a queue with more room of each kind that is short."""
     bins = queue.num_bins
     if bins == len(queue.heads):
-        rooms = GROWTH * bins
-        table = np.zeros(4 * rooms, np.int32)
-        cells = _enlarged(queue.cells, bins, rooms)
+        most = GROWTH * bins
+        table = np.zeros(4 * most, np.int32)
+        cells = resized_copy(queue.cells, bins, most)
         _rehash(cells, table, bins)
-        return queue._replace(heads=_enlarged(queue.heads, bins, rooms), cells=cells, table=table,
-                              order=_enlarged(queue.order, bins, rooms))
+        return queue._replace(heads=resized_copy(queue.heads, bins, most), cells=cells, table=table,
+                              order=resized_copy(queue.order, bins, most))
     rows = int(queue.used[0])
     largest = 1 << (int(queue.heads[:bins, SIZE].max(initial=SMALLEST)) + 1)
-    return queue._replace(pool=_enlarged(queue.pool, rows, max(GROWTH * len(queue.pool), rows + largest)))
-
-
-def _enlarged(array: np.ndarray, used: int, rows: int) -> np.ndarray:
-    larger = np.empty((rows, *array.shape[1:]), array.dtype)
-    larger[:used] = array[:used]
-    return larger
+    return queue._replace(pool=resized_copy(queue.pool, rows, max(GROWTH * len(queue.pool), rows + largest)))
 
 
 @njit(cache=True)

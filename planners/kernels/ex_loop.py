@@ -3,14 +3,16 @@
 from typing import Any
 
 import numpy as np
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
+from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.compiled import STEP_TYPE
 from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, make_room_and_add
-from pbcs_ompl.planners.kernels.prefetch import prefetch
 from pbcs_ompl.planners.kernels.runs import MEMBER, choose, peek
-from pbcs_ompl.planners.tree import Columns
 
 DONE, GOAL, FULL, NOT_FINITE = range(4)
 
@@ -19,7 +21,27 @@ _vector = types.float64[::1]
 _integers = types.int64[::1]
 COLUMNS_TYPE = types.NamedTuple(
     (_matrix, _matrix, _matrix, types.int32[::1], _vector, types.boolean[::1]), Columns)
-"""Numba's type of `pbcs_ompl.planners.tree.Columns`."""
+"""Numba's type of `pbcs_ompl.core.tree.Columns`."""
+
+
+@intrinsic
+def prefetch(typing_context: Any, array: Any, row: Any) -> Any:
+    """Fetch the first cache line of array[row] of a two-dimensional array into the cache; changes no value."""
+    signature = types.void(array, types.intp)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array_type = signature.args[0]
+        structure = context.make_array(array_type)(context, builder, arguments[0])
+        first = context.get_constant(types.intp, 0)
+        pointer = cgutils.get_item_pointer(context, builder, array_type, structure, [arguments[1], first])
+        byte, flag = ir.PointerType(ir.IntType(8)), ir.IntType(32)
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag]), "llvm.prefetch.p0")
+        read, keep, data = (ir.Constant(flag, value) for value in (0, 3, 1))
+        builder.call(function, [builder.bitcast(pointer, byte), read, keep, data])
+        return context.get_dummy_value()
+
+    return signature, generate
 
 
 @njit(cache=True)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.types import Array, BoolArray, Transition
 
 
@@ -14,7 +15,7 @@ class Square:
 
     def __init__(self, size: int = 2, feature_dims: tuple[int, ...] | None = (0, 1), goal: float = 4.5,
                  radius: float = 0.5, start: tuple[float, float] = (0.5, 0.5)):
-        self.env_id, self.env_kwargs = "square", {"size": size, "list": (1, 2)}
+        self.spec = EnvSpec("square", {"size": size, "list": (1, 2)})
         self.capabilities = frozenset({"visited", "arbitrary", "exact"})
         self.where = [0, 1] if feature_dims is None else list(feature_dims)
         self.state_low, self.state_high = np.zeros(size), np.full(size, 1e6)

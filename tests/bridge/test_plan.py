@@ -18,7 +18,8 @@ from ompl import control as oc
 
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.bridge.tree import TreeArrays
+from pbcs_ompl.bridge.tree import load_tree
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import (
     CallbackFailed,
     InvalidOption,
@@ -78,9 +79,10 @@ def test_plan_solves_a_maze_and_leaves_its_evidence(planner, tmp_path):
     assert list(result.summary()) == SUMMARY
     assert json.loads((out / "result.json").read_text()) == result.summary()
     config = read_toml(out / "config.toml")
-    assert (config["env"], config["env_kwargs"]["size"], config["seed"]) == (MAZE, 3, 1)
+    assert (config["kind"], config["environment"]["id"], config["seed"]) == ("plan", MAZE, 1)
+    assert config["environment"]["kwargs"]["size"] == 3
     assert config["versions"]["ompl"]
-    trajectory, tree = Trajectory.load(out / "trajectory.npz"), TreeArrays.load(out / "tree.npz")
+    trajectory, tree = Trajectory.load(out / "trajectory.npz"), load_tree(out / "tree.npz")
     model = make(MAZE, {"size": 3})
     trajectory.check_belongs_to(model)
     assert trajectory.replays_exactly(model)
@@ -99,7 +101,7 @@ def test_tree_is_one_tree_and_holds_the_path(planner):
     before, after = tree.states[tree.parents[children]], tree.states[children]
     edges = {(one.tobytes(), other.tobytes()) for one, other in zip(before, after, strict=True)}
     assert {(one.tobytes(), other.tobytes()) for one, other in pairwise(path)} <= edges
-    if tree.controls is not None:
+    if tree.has_controls:
         assert np.array_equal(model.transition(before, tree.controls[children]).states, after)
 
 
@@ -109,7 +111,7 @@ def test_budget_ends_an_unreachable_goal_and_the_tree_is_saved(square, tmp_path)
         result = plan(square(goal=9.0), planner, max_transitions=2_000, out=tmp_path / name)
         assert (result.solved, result.transitions) == (False, 2_000)
         assert (result.path_length, result.replay_ok, result.trajectory) == (None, None, None)
-        assert len(TreeArrays.load(tmp_path / name / "tree.npz").states) == result.nodes > 100
+        assert len(load_tree(tmp_path / name / "tree.npz").states) == result.nodes > 100
         assert not (tmp_path / name / "trajectory.npz").exists()
 
 
@@ -151,16 +153,39 @@ def test_replay_finds_out_an_environment_that_is_not_deterministic(square):
     assert plan(model, FirstStep, planner_kwargs={"claim": "exact"}).replay_ok is False
 
 
-@pytest.mark.parametrize("env", ["id", "model", "gymnasium"])
-def test_environment_is_given_in_three_ways(env):
+@pytest.mark.parametrize("env", ["id", "spec", "model", "gymnasium"])
+def test_environment_is_given_in_four_ways(env):
     import gymnasium
 
     model = make(MAZE, {"size": 3})
-    given = {"id": MAZE, "model": model, "gymnasium": gymnasium.make(MAZE, size=3)}[env]
+    given = {"id": MAZE, "model": model, "spec": EnvSpec(MAZE, {"size": 3}),
+             "gymnasium": gymnasium.make(MAZE, size=3)}[env]
     result = plan(given, oc.RRT, env_kwargs={"size": 3} if env == "id" else None)
     assert result.solved
     assert result.replay_ok
-    assert (result.env, result.trajectory.env_kwargs["size"]) == (MAZE, 3)
+    assert (result.env, result.trajectory.environment.kwargs["size"]) == (MAZE, 3)
+
+
+@pytest.mark.parametrize(("planner", "given", "expected"), [
+    ("Ex", {}, {"bin_size": [0.15, 0.15], "batch": "grow", "control_duration": 1}),
+    ("ex", {"bin_size": 0.2, "batch": 3}, {"bin_size": [0.2, 0.2], "batch": 3, "control_duration": 1}),
+    ("ESTAdapted", {"distance": [0.1, 0.3]}, {"distance": [0.1, 0.3], "batch": "grow", "control_duration": 1}),
+    ("RandomWalk", {"control_duration": 2}, {"max_steps": 180, "walkers": 1, "batch": "grow", "control_duration": 2}),
+    ("RRTNH", {}, {"batch": "grow", "control_duration": 1}),
+    ("RRT", {"goal_bias": 0.1}, {"goal_bias": 0.1, "intermediate_states": False, "control_duration": 1}),
+    (oc.KPIECE1, {}, {}),
+    (FirstStep, {"steps": 2}, {"claim": "nothing", "steps": 2}),
+])
+def test_a_folder_holds_every_option_of_the_planner_and_repeats_the_run(planner, given, expected, tmp_path):
+    maze = {"env_kwargs": {"size": 3}, "seed": 1, "max_transitions": 300}
+    first = plan(MAZE, planner, planner_kwargs=given, out=tmp_path / "run", **maze)
+    config = read_toml(tmp_path / "run" / "config.toml")
+    assert config.get("planner_kwargs", {}) == first.planner_settings == expected
+    again = plan(EnvSpec(**config["environment"]), planner if callable(planner) else config["planner"],
+                 planner_kwargs=config.get("planner_kwargs", {}), seed=config["seed"],
+                 max_transitions=config["max_transitions"])
+    assert again.tree.states.tobytes() == first.tree.states.tobytes()
+    assert again.planner_settings == first.planner_settings
 
 
 @pytest.mark.parametrize(("arguments", "error", "message"), [
@@ -245,12 +270,12 @@ def test_failing_planner_and_progress(square):
         plan(square(), oc.RRT, on_progress=lambda _: (_ for _ in ()).throw(OSError("no terminal")))
 
 
-def test_progress_tells_plain_numbers(square):
-    told = []
-    plan(square(goal=9.0), oc.KPIECE1, max_seconds=0.6, on_progress=told.append)
-    assert 2 <= len(told) <= 10
-    assert all(json.loads(json.dumps(numbers)) == numbers for numbers in told)
-    assert [numbers["transitions"] for numbers in told] == sorted(numbers["transitions"] for numbers in told)
+def test_progress_reports_plain_numbers(square):
+    reports = []
+    plan(square(goal=9.0), oc.KPIECE1, max_seconds=0.6, on_progress=reports.append)
+    assert 2 <= len(reports) <= 10
+    assert all(json.loads(json.dumps(numbers)) == numbers for numbers in reports)
+    assert [numbers["transitions"] for numbers in reports] == sorted(numbers["transitions"] for numbers in reports)
 
 
 def test_folder_that_exists_is_refused_before_the_search(square, tmp_path):

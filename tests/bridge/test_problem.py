@@ -9,25 +9,24 @@ import pytest
 from ompl import base as ob
 from ompl import control as oc
 
-from pbcs_ompl.bridge.layout import blocks, state_reader, state_writer
-from pbcs_ompl.bridge.path import to_trajectory
-from pbcs_ompl.bridge.problem import make_problem, quiet_ompl
-from pbcs_ompl.bridge.stopping import make_stop
+from pbcs_ompl.bridge.problem import make_problem
+from pbcs_ompl.bridge.termination import make_stop
+from pbcs_ompl.bridge.trajectory import to_trajectory
 from pbcs_ompl.core.errors import CallbackFailed, InvalidState, UnsupportedSpace
+from pbcs_ompl.core.ompl_access import quiet_ompl, value_reader, value_writer
 from pbcs_ompl.core.types import Counter
 
 
 def propagate(problem, state, control, steps=1, alias=False):
     """Return the state that OMPL's propagate leads to."""
     information = problem.space_information
-    parts = blocks(len(problem.model.state_low), problem.model.feature_dims)
     before, action = information.allocState(), information.allocControl()
     after = before if alias else information.allocState()
-    state_writer(parts)(before, state)
+    value_writer(information.getStateSpace())(before, state)
     for dim, value in enumerate(control):
         action[dim] = value
     information.propagate(before, action, steps, after)
-    return state_reader(parts)(after)
+    return value_reader(information.getStateSpace())(after)
 
 
 @pytest.mark.parametrize("alias", [False, True])
@@ -50,7 +49,7 @@ def test_budget_is_never_exceeded(square):
     counter = Counter(3)
     with make_problem(square(), counter=counter) as problem:
         ends = [propagate(problem, [1.0, 1.0], [0.1, 0.1])[0] for _ in range(5)]
-        assert problem.watch.stopped
+        assert problem.callbacks.stopped
     assert counter.count == 3
     assert ends == [1.1, 1.1, 1.1, 1.0, 1.0]
 
@@ -81,7 +80,7 @@ def test_failing_callback_stops_the_planner_and_is_raised_again(square, planner,
         solve(problem, planner)
         assert not problem.setup.haveExactSolutionPath()
         with pytest.raises(CallbackFailed, match=message):
-            problem.watch.raise_error()
+            problem.callbacks.raise_error()
     assert len(calls) <= 31
 
 
@@ -90,7 +89,7 @@ def solve(problem, planner):
     built = planner(problem.space_information)
     problem.setup.setPlanner(built)
     problem.setup.setup()
-    built.solve(ob.PlannerTerminationCondition(make_stop(problem.watch, 10.0, None)))
+    built.solve(ob.PlannerTerminationCondition(make_stop(problem.callbacks, 10.0, None)))
     return built
 
 
@@ -100,7 +99,7 @@ def solve_square(model, planner, seed, budget=50_000):
         solve(problem, planner)
         assert problem.setup.haveExactSolutionPath()
         path = problem.setup.getSolutionPath()
-        return to_trajectory(path, model), path.check()
+        return to_trajectory(path, problem.space_information, model), path.check()
 
 
 @pytest.mark.parametrize("planner", [oc.RRT, oc.EST, oc.KPIECE1])
@@ -179,7 +178,7 @@ def test_impossible_start_is_refused(square, start, message):
 def test_custom_start_is_where_the_tree_starts(square):
     with quiet_ompl(), make_problem(square(), start=np.array([3.0, 4.0]), counter=Counter(5_000)) as problem:
         solve(problem, oc.RRT)
-        trajectory = to_trajectory(problem.setup.getSolutionPath(), problem.model)
+        trajectory = to_trajectory(problem.setup.getSolutionPath(), problem.space_information, problem.model)
     assert trajectory.states[0].tolist() == [3.0, 4.0]
 
 

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ompl import base as ob
 
-from pbcs_ompl.bridge.layout import blocks, state_reader, state_writer
 from pbcs_ompl.bridge.problem import make_problem
-from pbcs_ompl.bridge.spaces import make_state_space
+from pbcs_ompl.bridge.spaces import blocks, make_state_space
+from pbcs_ompl.core.ompl_access import value_reader, value_writer
 from pbcs_ompl.core.types import Counter
 
 
@@ -23,25 +23,25 @@ def test_blocks_cover_the_state_in_order(explored):
 def test_what_is_written_is_read(any_square):
     rng = np.random.default_rng(0)
     with make_problem(any_square, counter=Counter()) as problem:
-        parts = blocks(len(any_square.state_low), any_square.feature_dims)
+        space = problem.setup.getStateSpace()
         state, other = (problem.space_information.allocState() for _ in range(2))
         for _ in range(20):
             values = rng.uniform(0, 5, len(any_square.state_low)).tolist()
-            state_writer(parts)(state, values)
+            value_writer(space)(state, values)
             problem.space_information.copyState(other, state)
-            assert state_reader(parts)(other) == values
+            assert value_reader(space)(other) == values
 
 
 @pytest.mark.parametrize("dims", [(0, 1), (1, 2), (2, 1)])
 def test_distance_is_between_features(square, dims):
     model = square(size=5, feature_dims=dims)
     with make_problem(model, counter=Counter()) as problem:
-        parts = blocks(5, dims)
+        write = value_writer(problem.setup.getStateSpace())
         information = problem.space_information
         one, two = information.allocState(), information.allocState()
         values = np.random.default_rng(1).uniform(0, 5, (2, 5))
-        state_writer(parts)(one, values[0].tolist())
-        state_writer(parts)(two, values[1].tolist())
+        write(one, values[0].tolist())
+        write(two, values[1].tolist())
         assert information.distance(one, two) == pytest.approx(model.distance(values[:1], values[1])[0])
 
 
@@ -49,8 +49,7 @@ def test_default_projection_is_the_feature(any_square):
     with make_problem(any_square, counter=Counter()) as problem:
         state = problem.space_information.allocState()
         values = np.random.default_rng(2).uniform(0, 5, len(any_square.state_low))
-        parts = blocks(len(values), any_square.feature_dims)
-        state_writer(parts)(state, values.tolist())
+        value_writer(problem.setup.getStateSpace())(state, values.tolist())
         coordinates = np.zeros(2, dtype=np.int32)
         projection = problem.setup.getStateSpace().getDefaultProjection()
         assert projection.getCellSizes() == any_square.bin_size.tolist()

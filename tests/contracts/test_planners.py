@@ -50,9 +50,9 @@ def search(entry, seed, budget, **options):
             planner.use_model(model, counter)
         setup.setPlanner(planner)
         setup.setup()
-        watch = problem.watch
-        status = planner.solve(ob.PlannerTerminationCondition(lambda: watch.stopped))
-        problem.watch.raise_error()
+        callbacks = problem.callbacks
+        status = planner.solve(ob.PlannerTerminationCondition(lambda: callbacks.stopped))
+        callbacks.raise_error()
         count, states, controls, checked = counter.count, np.empty((0, 2)), np.empty((0, 2)), True
         if setup.haveExactSolutionPath():
             path = setup.getSolutionPath()

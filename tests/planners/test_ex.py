@@ -42,7 +42,7 @@ def test_batch_1_and_compiled_are_alg_5_to_the_last_bit(solve, square, compiled_
     states, parents, controls = plain_alg_5(square(), seed, 5000)
     gears = ((square(), {"batch": 1}), (compiled_square(), {}), (compiled_square(), {"batch": 1}))
     for model, options in gears:
-        planner, status, counter, _ = solve(lambda si, o=options: Ex(si, seed=seed, **o), model)
+        planner, status, counter, _ = solve(lambda si, o=options: Ex.build(si, seed=seed, **o), model)
         assert planner.error is None
         assert status == EXACT
         assert counter.count == len(parents) - 1
@@ -54,10 +54,10 @@ def test_batch_1_and_compiled_are_alg_5_to_the_last_bit(solve, square, compiled_
 def test_budget_and_second_solve_go_on_with_the_same_tree(solve, compiled_square):
     """In slices of the budget, the compiled loop makes the tree that it makes at once."""
     model = compiled_square(goal=9.0)
-    whole, status, counter, _ = solve(lambda si: Ex(si), model, 70_000)
+    whole, status, counter, _ = solve(lambda si: Ex.build(si), model, 70_000)
     assert status == TIMEOUT
     assert counter.count == 70_000 == len(whole.tree) - 1
-    parts, _, counter, _ = solve(lambda si: Ex(si), model, 2048)
+    parts, _, counter, _ = solve(lambda si: Ex.build(si), model, 2048)
     for budget in (4096, 40_960, 70_000):
         counter.budget = budget
         parts.solve(ob.PlannerTerminationCondition(lambda: False))
@@ -66,7 +66,7 @@ def test_budget_and_second_solve_go_on_with_the_same_tree(solve, compiled_square
 
 def test_growing_batches_cost_few_more_transitions(solve, square, compiled_square):
     """A batch per tie finds the goal with about the transitions of Alg. 5, in far fewer calls."""
-    alone, batched = (np.median([solve(lambda si, s=seed: Ex(si, seed=s), model(), 20_000)[2].count
+    alone, batched = (np.median([solve(lambda si, s=seed: Ex.build(si, seed=s), model(), 20_000)[2].count
                                  for seed in range(30)]) for model in (compiled_square, square))
     assert batched < 1.6 * alone
 
@@ -81,7 +81,7 @@ def test_batches_come_in_portions_that_keep_all_cores_busy(solve, square, portio
         return transition(states, controls)
 
     model.parallel_batch, model.transition = portion, counted
-    planner, _, counter, _ = solve(lambda si: Ex(si), model, 4001)
+    planner, _, counter, _ = solve(lambda si: Ex.build(si), model, 4001)
     assert planner.error is None
     assert counter.count == sum(sizes) == 4001
     assert sizes[-1] % portion == 1  # the rest of the budget
@@ -96,7 +96,7 @@ def test_terminal_states_are_never_expanded(solve, square):
             dead = result.states[:, 0] > 1.0
             return result._replace(terminated=dead, success=np.zeros_like(dead))
 
-    planner, status, _, _ = solve(lambda si: Ex(si), Deadly(), 4000)
+    planner, status, _, _ = solve(lambda si: Ex.build(si), Deadly(), 4000)
     tree = planner.tree
     assert status == TIMEOUT
     assert tree.terminal.any()
@@ -104,7 +104,7 @@ def test_terminal_states_are_never_expanded(solve, square):
 
 
 def test_bin_size_is_an_option(solve, compiled_square):
-    small, large = (solve(lambda si, b=size: Ex(si, bin_size=b), compiled_square(goal=9.0), 3000)[0].strategy
+    small, large = (solve(lambda si, b=size: Ex.build(si, bin_size=b), compiled_square(goal=9.0), 3000)[0].strategy
                     for size in (0.1, [1.0, 3.0]))
     assert small.queue.num_bins > 200
     assert large.queue.num_bins == 3
@@ -113,11 +113,11 @@ def test_bin_size_is_an_option(solve, compiled_square):
 @pytest.mark.parametrize("size", [0.0, -1.0, float("nan"), [[1.0]], "large"])
 def test_bad_bin_sizes_are_refused(make_setup, square, size):
     with pytest.raises(InvalidOption, match="bin_size"):
-        Ex(make_setup(square()).getSpaceInformation(), bin_size=size)
+        Ex.build(make_setup(square()).getSpaceInformation(), bin_size=size)
 
 
 def test_bin_size_of_another_dimension_is_refused(solve, square):
-    planner, _, _, _ = solve(lambda si: Ex(si, bin_size=[1.0, 1.0, 1.0]), square())
+    planner, _, _, _ = solve(lambda si: Ex.build(si, bin_size=[1.0, 1.0, 1.0]), square())
     assert isinstance(planner.error, InvalidOption)
 
 
@@ -126,11 +126,11 @@ def test_nan_in_the_compiled_step_names_the_transition(solve, compiled_square):
     step = model.compiled_step()
     model.compiled_step = lambda: (step[0], np.array([np.inf, 2.7, 0.3, 1.0]), *step[2:])
     model.action_low, model.action_high = np.full(2, -1e308), np.full(2, 1e308)  # their difference overflows
-    planner, _, _, _ = solve(lambda si: Ex(si), model)
+    planner, _, _, _ = solve(lambda si: Ex.build(si), model)
     assert isinstance(planner.error, CallbackFailed)
     assert "expected finite numbers" in str(planner.error)
 
 
 def test_memory_of_a_node(solve, compiled_square):
-    planner, _, _, _ = solve(lambda si: Ex(si, bin_size=0.1), compiled_square(goal=9.0), 300_000)
+    planner, _, _, _ = solve(lambda si: Ex.build(si, bin_size=0.1), compiled_square(goal=9.0), 300_000)
     assert (planner.tree.nbytes + planner.strategy.nbytes) / len(planner.tree) < 110

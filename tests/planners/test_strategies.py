@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.planners import RRTNH, ESTAdapted, RandomWalk, RRTSteered, Space, Tree
-from pbcs_ompl.planners.est_adapted import SparseFirst
-from pbcs_ompl.planners.rrt_nh import NearestToRandom
+from pbcs_ompl.planners import RRTNH, ESTAdapted, PlanningContext, RandomWalk, RRTSteered, Tree
 
 
-def space(features=2, **others):
-    return Space(np.zeros(features), np.full(features, 4.0), np.full(features, 0.5), np.full(2, -0.1),
+def context(features=2, **others):
+    return PlanningContext(np.zeros(features), np.full(features, 4.0), np.full(features, 0.5), np.full(2, -0.1),
                  np.full(2, 0.1), **others)
 
 
@@ -25,8 +23,8 @@ def test_est_draws_nodes_by_the_inverse_of_omega(features):
     """A node's frequency goes with 1 / (nodes in the 3^F cells around it); beyond 4 features, in its cell."""
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(2.0, 0.2, (40, features)), rng.uniform(0, 4, (20, features))])
-    strategy = SparseFirst()
-    strategy.start(space(features), rng)
+    strategy = ESTAdapted()
+    strategy.start(context(features), rng)
     strategy.inserted(tree_of(points), 0, 60)
     reach = 1 if features <= 4 else 0
     cells = np.floor(points / (1.0 / (2 * reach + 1)))
@@ -39,8 +37,8 @@ def test_est_draws_nodes_by_the_inverse_of_omega(features):
 def test_rrt_selects_the_nearest_that_is_not_terminal():
     rng = np.random.default_rng(1)
     points, terminal = rng.uniform(0, 4, (300, 2)), rng.random(300) < 0.5
-    strategy, tree = NearestToRandom(), tree_of(points, terminal)
-    strategy.start(space(), rng)
+    strategy, tree = RRTNH(), tree_of(points, terminal)
+    strategy.start(context(), rng)
     for first in range(0, 300, 50):
         strategy.inserted(tree, first, first + 50)
     targets = strategy.draw_targets(500)
@@ -52,19 +50,19 @@ def test_rrt_selects_the_nearest_that_is_not_terminal():
 
 
 def test_rrt_needs_a_box():
-    boundless = Space(np.zeros(2), np.full(2, np.inf), np.ones(2), np.zeros(2), np.ones(2))
+    boundless = PlanningContext(np.zeros(2), np.full(2, np.inf), np.ones(2), np.zeros(2), np.ones(2))
     with pytest.raises(InvalidOption, match="bounded by"):
-        NearestToRandom().start(boundless, np.random.default_rng(0))
+        RRTNH().start(boundless, np.random.default_rng(0))
 
 
 def test_steering_reaches_the_goal_in_fewer_transitions(solve, square):
-    steered, random = (np.median([solve(lambda si, s=seed, k=kind: k(si, seed=s), square(), 50_000)[2].count
+    steered, random = (np.median([solve(lambda si, s=seed, k=kind: k.build(si, seed=s), square(), 50_000)[2].count
                                   for seed in range(5)]) for kind in (RRTSteered, RRTNH))
     assert steered < 0.5 * random
 
 
 def test_no_steering_is_named(solve, square):
-    planner, _, _, _ = solve(lambda si: RRTSteered(si), square(steering=False))
+    planner, _, _, _ = solve(lambda si: RRTSteered.build(si), square(steering=False))
     assert isinstance(planner.error, InvalidOption)
 
 
@@ -76,7 +74,7 @@ def test_random_walks_are_chains_from_the_root(solve, square, walkers):
             result = super().transition(states, controls)
             return result._replace(terminated=result.states[:, 0] < 0.3)
 
-    planner, _, _, _ = solve(lambda si: RandomWalk(si, max_steps=20, walkers=walkers), Deadly(goal=9.0), 1000)
+    planner, _, _, _ = solve(lambda si: RandomWalk.build(si, max_steps=20, walkers=walkers), Deadly(goal=9.0), 1000)
     tree = planner.tree
     children = np.bincount(tree.parents[1:], minlength=len(tree))
     assert (children[1:] <= 1).all()
@@ -93,4 +91,4 @@ def test_random_walks_are_chains_from_the_root(solve, square, walkers):
 ])
 def test_bad_values_are_refused(make_setup, square, kind, options):
     with pytest.raises(InvalidOption, match=next(iter(options))):
-        kind(make_setup(square()).getSpaceInformation(), **options)
+        kind.build(make_setup(square()).getSpaceInformation(), **options)

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import InvalidOption, TrainingStalled
 from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
 from pbcs_ompl.skills import train
 from pbcs_ompl.skills.config import TrainConfig
-from pbcs_ompl.skills.exploration import explore
+from pbcs_ompl.skills.exploration import explore, without_goal
 from pbcs_ompl.skills.learner import Learner
 from pbcs_ompl.skills.milestones import Milestones
 from pbcs_ompl.skills.offline import Bootstrapped, Offline
@@ -34,6 +35,16 @@ def test_an_exploration_goes_on_beyond_the_goal_and_is_true():
     assert set(np.unique(found.rewards)) == {-1.0, 0.0, 1.0}
     np.testing.assert_array_equal(found.terminals, found.rewards == 1.0)
     assert not (MODEL.goal_distance(found.states) < MODEL.goal_threshold).any()
+
+
+def test_an_exploration_is_alg_5_one_node_at_a_time():
+    """Every node is selected after all nodes before it were inserted, as with batch=1."""
+    model = without_goal(MODEL)
+    tree = plan(model, "Ex", planner_kwargs={"batch": 1}, seed=3, max_transitions=2000).tree
+    found = explore(MODEL, 2000, seed=3)
+    np.testing.assert_array_equal(found.next_states, tree.states[1:])
+    batched = plan(model, "Ex", seed=3, max_transitions=2000).tree
+    assert not np.array_equal(batched.states, tree.states)
 
 
 def test_explorations_repeat_themselves_and_differ_by_seed():

@@ -168,10 +168,10 @@ def test_a_plan_made_before_is_used():
 
 def test_the_planner_can_be_chosen_and_the_folder_says_which(tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, planner="KPIECE1", planner_kwargs={"hold": 2},
+        train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, planner="KPIECE1", planner_kwargs={"control_duration": 2},
               out=tmp_path / "run", on_progress=StopAfter(1))
     config = read_toml(tmp_path / "run" / "config.toml")
-    assert (config["planner"], config["planner_kwargs"]) == ("KPIECE1", {"hold": 2})
+    assert (config["planner"], config["planner_kwargs"]) == ("KPIECE1", {"control_duration": 2})
     found = Trajectory.load(tmp_path / "run" / "trajectory.npz")
     assert found.planner == "KPIECE1"
     with pytest.raises(InvalidOption, match="remove planner"):

@@ -4,10 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, nullcontext
 from pathlib import Path
 
-from pbcs_ompl.bridge.building import PlannerSpec
-from pbcs_ompl.bridge.problem import make_problem, quiet_ompl
+from pbcs_ompl.bridge.planner_spec import PlannerSpec
+from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import MissingDependency, PlannerUnavailable
+from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.experiments.compare.benchmark_log import write_logs
 from pbcs_ompl.experiments.compare.comparison import DATABASE, Comparison, merge

@@ -4,12 +4,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pbcs_ompl.bridge.stopping import checked_limits
-from pbcs_ompl.bridge.versions import planning_versions
+from pbcs_ompl.bridge.termination import checked_limits
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.experiments.compare.run import Job
 from pbcs_ompl.resettable import make
+from pbcs_ompl.results.provenance import planning_versions
 
 Options = dict[str, Any]
 

@@ -47,7 +47,7 @@ SMALL = {
         for name in ("small", "small-learnt", "again")}},
     "presets": {"max_transitions": 1500, "sizes": {"2": {"seeds": 1}}},
     "antmaze-exploration": {"max_transitions": 100},
-    "control-duration": {"max_transitions": 5000, "hold": [1, 3],
+    "control-duration": {"max_transitions": 5000, "control_durations": [1, 3],
                          "scenes": {"maze-2": {"env": "pbcs/Maze-v0", "env_kwargs": {"size": 2}}}},
 }
 SLOW = ("backplay-2x2", "deadlock", "exploration-trees", "half-cheetah-priming", "offline-vs-bootstrapped")

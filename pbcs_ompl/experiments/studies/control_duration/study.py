@@ -1,4 +1,4 @@
-"""Plan with controls that are held for 1 to k steps."""
+"""Plan with controls that last 1 to k steps."""
 
 from typing import Any
 
@@ -7,10 +7,10 @@ from pbcs_ompl.bridge.plan import plan
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
     """One run for each seed, scene, planner and k."""
-    return [{"name": f"{scene}-{planner}-{hold}-{seed}", "scene": scene, "planner": planner, "hold": hold, "seed": seed,
-             "max_transitions": sweep["max_transitions"], **options}
+    return [{"name": f"{scene}-{planner}-{duration}-{seed}", "scene": scene, "planner": planner,
+             "control_duration": duration, "seed": seed, "max_transitions": sweep["max_transitions"], **options}
             for seed in range(seeds) for scene, options in sweep["scenes"].items()
-            for planner in sweep["planners"] for hold in sweep["hold"]]
+            for planner in sweep["planners"] for duration in sweep["control_durations"]]
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
@@ -18,7 +18,8 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     seed, kwargs = settings["seed"], settings.get("env_kwargs", {})
     if "size" in kwargs:
         kwargs = kwargs | {"maze_seed": seed}
-    found = plan(settings["env"], settings["planner"], env_kwargs=kwargs, planner_kwargs={"hold": settings["hold"]},
-                 seed=seed, max_transitions=settings["max_transitions"])
+    found = plan(settings["env"], settings["planner"], env_kwargs=kwargs,
+                 planner_kwargs={"control_duration": settings["control_duration"]}, seed=seed,
+                 max_transitions=settings["max_transitions"])
     return settings | {"env_kwargs": kwargs, "solved": found.solved, "transitions": found.transitions,
                        "path_length": found.path_length, "replay_ok": found.replay_ok}

@@ -26,7 +26,8 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     """Explore without a goal, and search for it where there is one."""
     model = make(settings["env"], settings.get("env_kwargs", {}))
     planner, seed = settings["planner"], settings["seed"]
-    tree = plan(without_goal(model), planner, seed=seed, max_transitions=settings["transitions"]).tree
+    tree = plan(without_goal(model), planner, planner_kwargs={"batch": 1}, seed=seed,
+                max_transitions=settings["transitions"]).tree
     counts, areas = cells(model, tree.states, settings["cell"])
     record = {**settings, "nodes": len(tree.states), "coverage": coverage(counts, areas),
               "evenness": evenness(counts, areas), "density": density(tree.states, settings["circle"])}

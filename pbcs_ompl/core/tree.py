@@ -1,6 +1,6 @@
-"""The tree that a planner grows, as arrays."""
+"""The tree of states that a planner grows, as arrays."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 
 GROWTH = 4
-"""Rooms that nobody has written to cost address space, but no memory; copies cost both memory and time."""
-FIRST_ROOM = 1 << 14
+"""Rows that were never written to cost address space, but no memory; copies cost both memory and time."""
+FIRST_ROWS = 1 << 14
 MOST_RESERVED = 1 << 30
-"""Bytes of address space that a tree may ask for in advance."""
+"""Bytes of address space that a tree may reserve in advance."""
 
 
 class Columns(NamedTuple):
-    """The arrays of a tree with room for R >= N nodes; what lies beyond the N nodes means nothing."""
+    """The arrays of a tree with R >= N rows; what lies beyond the N nodes means nothing."""
 
     states: Array
     """[R, D]"""
@@ -34,7 +34,8 @@ class Tree:
     Its arrays are views: they show the nodes that were there when they were asked for.
 
     Args:
-        state_size, control_size: D and A.
+        state_size: D.
+        control_size: A; 0 for the tree of a planner that does not report its controls.
         feature_size: F, or None where the state is the feature.
         expected: How many nodes there may be, if that is known: address space is reserved for them.
     """
@@ -42,12 +43,26 @@ class Tree:
     def __init__(self, state_size: int, control_size: int, feature_size: int | None = None, *,
                  expected: int = 0):
         node_bytes = 8 * (state_size + (feature_size or 0) + control_size) + 13
-        room = max(FIRST_ROOM, min(expected, MOST_RESERVED // node_bytes))
-        states = np.empty((room, state_size))
-        features = states if feature_size is None else np.empty((room, feature_size))
-        self.columns = Columns(states, features, np.empty((room, control_size)), np.empty(room, np.int32),
-                               np.empty(room), np.empty(room, np.bool_))
+        rows = max(FIRST_ROWS, min(expected, MOST_RESERVED // node_bytes))
+        states = np.empty((rows, state_size))
+        features = states if feature_size is None else np.empty((rows, feature_size))
+        self.columns = Columns(states, features, np.empty((rows, control_size)), np.empty(rows, np.int32),
+                               np.empty(rows), np.empty(rows, np.bool_))
         self._size = 0
+
+    @classmethod
+    def from_arrays(cls, states: Array, parents: NDArray[Any], controls: Array | None = None) -> Self:
+        """Return a tree of which only this is known: its rewards are NaN and no node is terminal.
+
+        Args:
+            states: The nodes' states [N, D].
+            parents: The parent of each node [N]; -1 for a root. They may come after their children.
+            controls: The control [N, A] that led from the parent; None where unknown.
+        """
+        known = np.empty((len(states), 0)) if controls is None else controls
+        tree = cls(states.shape[1], known.shape[1])
+        tree.append(states, parents, known, np.nan, False)
+        return tree
 
     def __len__(self) -> int:
         return self._size
@@ -64,8 +79,13 @@ class Tree:
 
     @property
     def controls(self) -> Array:
-        """The control [N, A] that led from the parent; 0 for a root."""
+        """The control [N, A] that led from the parent; 0 for a root, [N, 0] where the planner reports none."""
         return self.columns.controls[:self._size]
+
+    @property
+    def has_controls(self) -> bool:
+        """Whether the planner reports its controls."""
+        return self.columns.controls.shape[1] > 0
 
     @property
     def parents(self) -> NDArray[np.int32]:
@@ -74,7 +94,7 @@ class Tree:
 
     @property
     def rewards(self) -> Array:
-        """The reward [N] of the transition from the parent; 0 for a root."""
+        """The reward [N] of the transition from the parent; 0 for a root, NaN where unknown."""
         return self.columns.rewards[:self._size]
 
     @property
@@ -84,13 +104,20 @@ class Tree:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the nodes; rooms that were never written to are not counted."""
+        """Bytes of the nodes; rows that were never written to are not counted."""
         distinct = {id(column): column for column in self.columns}.values()
         return sum(column[:self._size].nbytes for column in distinct)
 
     def append(self, states: Array, parents: Any, controls: Array | float, rewards: Array | float,
                terminal: BoolArray | bool, features: Array | None = None) -> None:
-        """Add B nodes: states [B, D], ..., features [B, F]; no features where the states are them."""
+        """Add B nodes.
+
+        Args:
+            states: Their states [B, D].
+            parents: Their parents [B], or one for all.
+            controls, rewards, terminal: The controls [B, A], rewards [B] and ends [B] of the transitions to them.
+            features: Their features [B, F]; None where the states are the features.
+        """
         count = len(states)
         self.reserve(count)
         new = slice(self._size, self._size + count)
@@ -107,12 +134,8 @@ class Tree:
     def reserve(self, count: int) -> None:
         """Make room for `count` more nodes."""
         needed = self._size + count
-        if needed <= len(self.columns.parents):
-            return
-        room = max(needed, GROWTH * len(self.columns.parents))
-        distinct = {id(column): column for column in self.columns}
-        larger = {key: _enlarged(column, self._size, room) for key, column in distinct.items()}
-        self.columns = Columns(*(larger[id(column)] for column in self.columns))
+        if needed > len(self.columns.parents):
+            self.columns = self._resized(max(needed, GROWTH * len(self.columns.parents)))
 
     def claim(self, count: int) -> None:
         """Count in `count` nodes that were written into the columns behind the last one."""
@@ -126,8 +149,18 @@ class Tree:
             path.append(int(parents[path[-1]]))
         return np.array(path[::-1], dtype=np.int64)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the nodes without the reserved rows, for pickle."""
+        return {"columns": self._resized(self._size), "_size": self._size}
 
-def _enlarged(column: np.ndarray, used: int, room: int) -> np.ndarray:
-    larger = np.empty((room, *column.shape[1:]), column.dtype)
-    larger[:used] = column[:used]
-    return larger
+    def _resized(self, rows: int) -> Columns:
+        distinct = {id(column): column for column in self.columns}
+        resized = {key: resized_copy(column, self._size, rows) for key, column in distinct.items()}
+        return Columns(*(resized[id(column)] for column in self.columns))
+
+
+def resized_copy(array: NDArray[Any], used: int, rows: int) -> NDArray[Any]:
+    """Return an array of `rows` rows whose first `used` rows are those of `array`."""
+    copy = np.empty((rows, *array.shape[1:]), array.dtype)
+    copy[:used] = array[:used]
+    return copy

@@ -1,4 +1,4 @@
-"""Controls that are held for several steps."""
+"""Controls that last several steps."""
 
 import numpy as np
 import pytest
@@ -17,8 +17,9 @@ def runs_of(controls: np.ndarray) -> list[int]:
 
 
 @pytest.mark.parametrize("planner", ["Ex", "RRTNH", "ESTAdapted", "RRT", "KPIECE1"])
-def test_controls_of_the_path_are_held_and_replay(planner: str) -> None:
-    result = plan("pbcs/Maze-v0", planner, seed=1, max_transitions=300_000, planner_kwargs={"hold": 4}, **MAZE)
+def test_controls_of_the_path_last_and_replay(planner: str) -> None:
+    result = plan("pbcs/Maze-v0", planner, seed=1, max_transitions=300_000, planner_kwargs={"control_duration": 4},
+                  **MAZE)
     assert result.solved
     assert result.replay_ok
     assert result.trajectory is not None
@@ -30,25 +31,23 @@ def test_controls_of_the_path_are_held_and_replay(planner: str) -> None:
 @pytest.mark.parametrize("kind", [Ex, RRTNH, ESTAdapted, RandomWalk])
 @pytest.mark.parametrize("budget", [1, 7, 500])
 def test_every_step_is_a_node_and_costs_one_transition(kind, budget: int) -> None:
-    result = plan("pbcs/Maze-v0", kind, max_transitions=budget, planner_kwargs={"hold": 5}, env_kwargs={"size": 9})
+    result, again = (plan("pbcs/Maze-v0", kind, max_transitions=budget, planner_kwargs={"control_duration": 5},
+                          env_kwargs={"size": 9}) for _ in range(2))
     assert result.transitions == budget
     assert result.nodes == budget + 1
-    tree = result.tree
-    again = plan("pbcs/Maze-v0", kind, max_transitions=budget, planner_kwargs={"hold": 5}, env_kwargs={"size": 9})
-    np.testing.assert_array_equal(tree.states, again.tree.states)
+    np.testing.assert_array_equal(result.tree.states, again.tree.states)
 
 
 def test_lengths_are_equally_likely() -> None:
-    tree = plan("pbcs/Maze-v0", "RandomWalk", max_transitions=6000, planner_kwargs={"hold": 3},
+    tree = plan("pbcs/Maze-v0", "RandomWalk", max_transitions=6000, planner_kwargs={"control_duration": 3},
                 env_kwargs={"size": 9}).tree
-    assert tree.controls is not None
     continued = np.array([(tree.controls[node] == tree.controls[parent]).all()
                           for node, parent in enumerate(tree.parents) if parent >= 0])
     assert continued.mean() == pytest.approx(0.5, abs=0.05)  # the mean length is 2
 
 
 @pytest.mark.parametrize("planner", ["Ex", "RRT"])
-@pytest.mark.parametrize("hold", [0, -1, 1.5, "many", True])
-def test_bad_lengths_are_refused(planner: str, hold: object) -> None:
-    with pytest.raises(InvalidOption, match="hold"):
-        plan("pbcs/Maze-v0", planner, planner_kwargs={"hold": hold})
+@pytest.mark.parametrize("duration", [0, -1, 1.5, "many", True])
+def test_bad_lengths_are_refused(planner: str, duration: object) -> None:
+    with pytest.raises(InvalidOption, match="control_duration"):
+        plan("pbcs/Maze-v0", planner, planner_kwargs={"control_duration": duration})

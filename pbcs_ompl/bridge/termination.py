@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from pbcs_ompl.bridge.watch import Watch
+from pbcs_ompl.bridge.problem import CallbackState
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.types import ProgressCallback
 
@@ -34,7 +34,7 @@ def checked_limits(max_transitions: int, max_seconds: float | None) -> Limits:
     return Limits(max_transitions, max_seconds)
 
 
-def make_stop(watch: Watch, max_seconds: float | None,
+def make_stop(callbacks: CallbackState, max_seconds: float | None,
               on_progress: ProgressCallback | None) -> Callable[[], bool]:
     """Return the function that a termination condition polls; its clock starts now.
 
@@ -51,10 +51,10 @@ def make_stop(watch: Watch, max_seconds: float | None,
         if now >= due and on_progress is not None:
             due = now + SECONDS_BETWEEN_REPORTS
             try:
-                on_progress({"transitions": watch.counter.count, "seconds": now - began})
-            except BaseException as error:  # nothing may cross OMPL's C++; `Watch.raise_error` raises it
-                watch.fail(error)
-        return watch.stopped or now >= deadline
+                on_progress({"transitions": callbacks.counter.count, "seconds": now - began})
+            except BaseException as error:  # nothing may cross OMPL's C++
+                callbacks.fail(error)
+        return callbacks.stopped or now >= deadline
 
     return stop
 
@@ -71,11 +71,11 @@ def interruptible(on_interrupt: Callable[[], None]) -> Iterator[None]:
         yield
         return
 
-    def remember(number: int, frame: Any) -> None:
+    def stop_once(number: int, frame: Any) -> None:
         signal.signal(signal.SIGINT, usual)
         on_interrupt()
 
-    signal.signal(signal.SIGINT, remember)
+    signal.signal(signal.SIGINT, stop_once)
     try:
         yield
     finally:

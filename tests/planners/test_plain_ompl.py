@@ -1,4 +1,4 @@
-"""The plain door: OMPL problems that know nothing of environments."""
+"""OMPL problems that know nothing of environments."""
 
 import math
 
@@ -19,7 +19,7 @@ def bounds(low, high, size=2):
 
 
 def car(propagate=None, valid=None):
-    """A car in SE(2) around a wall, controls (speed, turn rate) held for 1 to 10 steps."""
+    """A car in SE(2) around a wall, controls (speed, turn rate) of 1 to 10 steps."""
     space = ob.SE2StateSpace()
     space.setBounds(bounds(0, 5))
     controls = oc.RealVectorControlSpace(space, 2)
@@ -54,7 +54,7 @@ def car(propagate=None, valid=None):
 @pytest.mark.parametrize("kind", [Ex, RRTNH, ESTAdapted], ids=lambda kind: kind.__name__)
 def test_a_car_is_solved_and_ompl_checks_its_path(kind):
     setup = car()
-    planner = kind(setup.getSpaceInformation(), seed=1)
+    planner = kind.build(setup.getSpaceInformation(), seed=1)
     setup.setPlanner(planner)
     status = setup.solve(20.0)
     assert planner.error is None
@@ -73,7 +73,7 @@ def test_equal_seeds_give_equal_trees_and_clear_goes_on_with_the_stream():
     trees = []
     for seed in (1, 1, 2):
         setup = car()
-        planner = Ex(setup.getSpaceInformation(), seed=seed)
+        planner = Ex.build(setup.getSpaceInformation(), seed=seed)
         setup.setPlanner(planner)
         setup.solve(20.0)
         trees.append(planner.tree.states.copy())
@@ -87,7 +87,7 @@ def test_equal_seeds_give_equal_trees_and_clear_goes_on_with_the_stream():
 
 def test_the_tree_is_that_of_the_projections():
     setup = car(valid=lambda state: state.getX() < 1.5)
-    planner = Ex(setup.getSpaceInformation())
+    planner = Ex.build(setup.getSpaceInformation())
     planner.setProblemDefinition(setup.getProblemDefinition())
     setup.setup()
     calls = iter(range(400))
@@ -101,7 +101,7 @@ def test_the_tree_is_that_of_the_projections():
 
 def test_seconds_are_a_termination_condition_too():
     setup = car(valid=lambda state: state.getX() < 1.5)
-    planner = RandomWalk(setup.getSpaceInformation())
+    planner = RandomWalk.build(setup.getSpaceInformation())
     planner.setProblemDefinition(setup.getProblemDefinition())
     assert planner.solve(0.05).getStatus() == ob.PlannerStatus.TIMEOUT
 
@@ -135,7 +135,7 @@ def test_compound_controls_and_states():
     for cart in (0, 1):
         start[cart][0], goal[cart][0] = 0.2, 0.8
     setup.setStartAndGoalStates(start, goal, 0.2)
-    planner = Ex(information)
+    planner = Ex.build(information)
     setup.setPlanner(planner)
     setup.solve(20.0)
     assert planner.error is None
@@ -150,7 +150,7 @@ def test_nan_from_the_propagator_names_the_transition():
         result.setYaw(float("nan"))
 
     setup = car(propagate=propagate)
-    planner = Ex(setup.getSpaceInformation())
+    planner = Ex.build(setup.getSpaceInformation())
     setup.setPlanner(planner)
     status = setup.solve(5.0)
     assert status.getStatus() == ob.PlannerStatus.ABORT
@@ -166,7 +166,7 @@ def test_exceptions_of_callbacks_stay_in_python(where):
         raise ZeroDivisionError("my own mistake")
 
     setup = car(propagate=fail) if where == "propagator" else car(valid=lambda s: s.getX() == 1.0 or fail())
-    planner = Ex(setup.getSpaceInformation())
+    planner = Ex.build(setup.getSpaceInformation())
     setup.setPlanner(planner)
     assert setup.solve(5.0).getStatus() == ob.PlannerStatus.ABORT
     assert isinstance(planner.error, CallbackFailed)
@@ -182,7 +182,7 @@ def test_a_start_inside_the_goal_is_a_path_of_one_state():
     start.setY(1.0)
     start.setYaw(0.0)
     setup.setStartAndGoalStates(start, start, 0.6)
-    setup.setPlanner(Ex(information))
+    setup.setPlanner(Ex.build(information))
     setup.solve(1.0)
     assert setup.haveExactSolutionPath()
     assert setup.getSolutionPath().getStateCount() == 1
@@ -190,14 +190,14 @@ def test_a_start_inside_the_goal_is_a_path_of_one_state():
 
 def test_an_invalid_start_is_a_status():
     setup = car(valid=lambda state: False)
-    planner = Ex(setup.getSpaceInformation())
+    planner = Ex.build(setup.getSpaceInformation())
     setup.setPlanner(planner)
     assert setup.solve(1.0).getStatus() == ob.PlannerStatus.INVALID_START
 
 
 def test_steering_needs_an_environment():
     setup = car()
-    planner = RRTSteered(setup.getSpaceInformation())
+    planner = RRTSteered.build(setup.getSpaceInformation())
     setup.setPlanner(planner)
     setup.solve(1.0)
     assert isinstance(planner.error, InvalidOption)
@@ -214,7 +214,7 @@ def test_a_space_without_projection_is_refused():
     setup = oc.SimpleSetup(controls)
     setup.setStatePropagator(lambda *_: None)
     setup.setStateValidityChecker(lambda state: True)
-    planner = Ex(setup.getSpaceInformation())
+    planner = Ex.build(setup.getSpaceInformation())
     planner.setProblemDefinition(setup.getProblemDefinition())
     planner.solve(1.0)
     assert isinstance(planner.error, UnsupportedSpace)
