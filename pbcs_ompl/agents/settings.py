@@ -1,11 +1,38 @@
-"""The settings that every algorithm has; each adds its own in a subclass of `AgentSettings`."""
+"""The settings that every algorithm has, and presets: named, versioned settings as data, one TOML file for each.
 
-from dataclasses import dataclass, fields
+Each algorithm adds its own settings in a subclass of `AgentSettings`. A preset's table [common] holds for all
+algorithms, those that are called like an algorithm for that one.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from importlib.resources import files
 from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
-from pbcs_ompl.agents.presets import make_settings, preset
-from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
+
+
+def preset_names() -> list[str]:
+    """Return the names of all presets, sorted."""
+    entries = [entry.name for entry in files("pbcs_ompl.agents").iterdir()]
+    return sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml"))
+
+
+def preset_version(name: str) -> int:
+    """Return the version of a preset, which grows whenever one of its values changes.
+
+    Raises:
+        UnknownName: no such preset; the message suggests the closest one.
+    """
+    return int(_read_preset(name)["version"])
+
+
+def _read_preset(name: str) -> dict[str, Any]:
+    if name not in preset_names():
+        raise UnknownName("preset", name, preset_names())
+    return tomllib.loads(files("pbcs_ompl.agents").joinpath(f"{name}.toml").read_text())
 
 
 @dataclass(frozen=True)
@@ -16,11 +43,14 @@ class AgentSettings:
         algorithm: The name of the algorithm's table in the files of presets.
         hidden: Widths of the hidden layers of actor and critic.
         layer_norm: Normalise the hidden layers.
-        polyak: Share of a target network that stays in each update (1 - tau).
+        actor_learning_rate, critic_learning_rate: Of Adam.
+        batch_size: Transitions in a mini-batch.
+        discount: Of rewards, gamma.
+        polyak: Fraction of a target network that stays in each update (1 - tau).
         replay_capacity: Transitions of each seed that are kept.
 
     Raises:
-        InvalidOption: a value out of its range.
+        InvalidOption: a value of the wrong type or out of its range.
     """
 
     algorithm: ClassVar[str]
@@ -39,17 +69,24 @@ class AgentSettings:
             object.__setattr__(self, "hidden", tuple(self.hidden))
         for field in fields(self):
             kind = type(field.default)
-            self._require(field.name, _is_a(kind, getattr(self, field.name)), f"a value of the kind {kind.__name__}")
+            self.require(field.name, _is_a(kind, getattr(self, field.name)), f"a value of type {kind.__name__}")
         widths = [isinstance(width, int) and width > 0 for width in self.hidden]
-        self._require("hidden", bool(widths) and all(widths), "positive whole numbers")
+        self.require("hidden", bool(widths) and all(widths), "positive whole numbers")
         for name in ("actor_learning_rate", "critic_learning_rate"):
-            self._require(name, getattr(self, name) > 0.0, "a positive number")
+            self.require(name, getattr(self, name) > 0.0, "a positive number")
         for name in ("batch_size", "replay_capacity"):
-            self._require(name, getattr(self, name) >= 1, "a positive number")
-        self._require("discount", 0.0 <= self.discount < 1.0, "in [0, 1)")
-        self._require("polyak", 0.0 <= self.polyak <= 1.0, "in [0, 1]")
+            self.require(name, getattr(self, name) >= 1, "a positive number")
+        self.require("discount", 0.0 <= self.discount < 1.0, "in [0, 1)")
+        self.require("polyak", 0.0 <= self.polyak <= 1.0, "in [0, 1]")
 
-    def _require(self, name: str, holds: bool, expected: str) -> None:
+    def require(self, name: str, holds: bool, expected: str) -> None:
+        """Raise an InvalidOption unless the condition on the setting `name` holds.
+
+        Args:
+            name: Of the setting.
+            holds: Whether its value is in its range.
+            expected: The range in words.
+        """
         if not holds:
             raise InvalidOption(f"{name} is {getattr(self, name)!r}, expected {expected}")
 
@@ -59,12 +96,41 @@ class AgentSettings:
 
         Raises:
             UnknownName: no such preset.
-            InvalidOption: no such setting, or a value out of its range.
+            InvalidOption: the preset has no values for this algorithm, an unknown setting, or a value out of its range.
         """
-        return make_settings(cls, preset(name, cls.algorithm) | changes)
+        tables = _read_preset(name)
+        if cls.algorithm not in tables and "common" not in tables:
+            raise InvalidOption(f"preset {name!r} has no settings for {cls.algorithm!r}")
+        values = tables.get("common", {}) | tables.get(cls.algorithm, {}) | changes
+        cls._check_names(values)
+        return cls(**values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all settings by name, as numbers and lists that TOML and JSON can hold; see `from_dict`."""
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Return the settings of `to_dict()`.
+
+        Raises:
+            InvalidOption: an unknown or a missing setting, or a value of the wrong type or out of its range.
+        """
+        cls._check_names(values)
+        missing = [field.name for field in fields(cls) if field.name not in values]
+        if missing:
+            raise InvalidOption(f"settings of {cls.algorithm} without {', '.join(missing)}; expected all of them")
+        return cls(**values)
+
+    @classmethod
+    def _check_names(cls, values: Mapping[str, Any]) -> None:
+        known = [field.name for field in fields(cls)]
+        for name in values:
+            if name not in known:
+                raise InvalidOption(f"unknown setting {name!r} of {cls.algorithm}{did_you_mean(name, known)}")
 
 
 def _is_a(kind: type, value: Any) -> bool:
-    """Tell whether a value may stand where one of this kind is expected: a whole number for any number, too."""
+    """Return whether a value may stand where this type is expected: a whole number for any number, too."""
     wider: dict[type, type] = {float: Real, int: Integral}
     return isinstance(value, wider.get(kind, kind)) and isinstance(value, bool) == (kind is bool)

@@ -22,7 +22,7 @@ def data(seed: int, count: int = 200) -> list[np.ndarray]:
 
 
 def fill(agent: DDPG, *seeds: int) -> DDPG:
-    agent.remember(*(np.stack(field) for field in zip(*(data(seed) for seed in seeds), strict=True)))
+    agent.add_transitions(*(np.stack(field) for field in zip(*(data(seed) for seed in seeds), strict=True)))
     return agent
 
 
@@ -186,7 +186,7 @@ def test_it_learns_to_reach_a_point_on_a_line() -> None:
     before, actions = rng.uniform(-1, 1, (2, 3000, 1)), rng.uniform(-0.2, 0.2, (2, 3000, 1))
     after = np.clip(before + actions, -1, 1)
     arrived = np.abs(after[..., 0]) < 0.1
-    agent.remember(before, actions, np.where(arrived, 0.0, -1.0), after, arrived)
+    agent.add_transitions(before, actions, np.where(arrived, 0.0, -1.0), after, arrived)
     agent.train(4000)
     places = np.linspace(-1, 1, 21)[None, :, None].repeat(2, axis=0)
     done = np.abs(places[..., 0]) < 0.1

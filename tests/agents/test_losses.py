@@ -21,7 +21,7 @@ def trained(kind: type[StackedAgent]) -> StackedAgent:
     settings = kind.settings_type(hidden=(16, 12), batch_size=BATCH, discount=DISCOUNT, polyak=0.9, **KINDS[kind])
     agent = kind(3, LOW, HIGH, settings=settings, seeds=(3, 4), compile=False)
     rng = np.random.default_rng(0)
-    agent.remember(rng.normal(size=(SEEDS, 200, 3)), rng.uniform(LOW, HIGH, (SEEDS, 200, 2)),
+    agent.add_transitions(rng.normal(size=(SEEDS, 200, 3)), rng.uniform(LOW, HIGH, (SEEDS, 200, 2)),
                    rng.normal(size=(SEEDS, 200)), rng.normal(size=(SEEDS, 200, 3)), rng.random((SEEDS, 200)) < 0.2)
     agent.train(20)
     return agent
@@ -226,7 +226,7 @@ def test_sac_learns_the_temperature_from_the_entropy() -> None:
 
 def test_a_temperature_without_learning_rate_stays() -> None:
     agent = SAC(3, LOW, HIGH, settings=SAC.settings_type(hidden=(8,), temperature=0.3, temperature_learning_rate=0.0))
-    agent.remember(*(np.zeros(shape) for shape in ((1, 9, 3), (1, 9, 2), (1, 9), (1, 9, 3), (1, 9))))
+    agent.add_transitions(*(np.zeros(shape) for shape in ((1, 9, 3), (1, 9, 2), (1, 9), (1, 9, 3), (1, 9))))
     assert agent.train(5)["temperature"] == pytest.approx(0.3)
 
 

@@ -26,7 +26,7 @@ def kind(monkeypatch):
 def filled(kind):
     agent = kind(3, LOW, HIGH, settings=TD3Settings(hidden=(16, 12), batch_size=32), seeds=(0,))
     rng = np.random.default_rng(0)
-    agent.remember(rng.normal(size=(1, 60, 3)), rng.uniform(LOW, HIGH, (1, 60, 2)), rng.normal(size=(1, 60)),
+    agent.add_transitions(rng.normal(size=(1, 60, 3)), rng.uniform(LOW, HIGH, (1, 60, 2)), rng.normal(size=(1, 60)),
                    rng.normal(size=(1, 60, 3)), rng.random((1, 60)) < 0.2)
     return agent
 

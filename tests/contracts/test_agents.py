@@ -31,7 +31,7 @@ def data(seed, count=200):
 
 
 def fill(agent, *seeds):
-    agent.remember(*(np.stack(field) for field in zip(*(data(seed) for seed in seeds), strict=True)))
+    agent.add_transitions(*(np.stack(field) for field in zip(*(data(seed) for seed in seeds), strict=True)))
     return agent
 
 
@@ -180,10 +180,10 @@ def test_bad_transitions_are_refused_and_nothing_is_kept(entry):
     fields = [field[None] for field in data(0, 10)]
     wrong = [*fields[:1], fields[1][..., :1], *fields[2:]]
     with pytest.raises(InvalidOption, match=r"actions have the shape \(1, 10, 1\), expected \(1, 10, 2\)"):
-        agent.remember(*wrong)
+        agent.add_transitions(*wrong)
     fields[0][0, 3, 1] = np.nan
     with pytest.raises(NonFiniteData, match="observations hold NaN or infinity, after update 0"):
-        agent.remember(*fields)
+        agent.add_transitions(*fields)
     assert agent.replay_sizes.tolist() == [0]
     with pytest.raises(InvalidOption, match="no transitions"):
         agent.train(1)
@@ -213,7 +213,7 @@ def test_it_solves_a_bandit_and_values_it(entry):
     agent = entry(1, [-1.0], [1.0], settings=entry.settings_type(hidden=(24, 24), batch_size=32), seeds=(0, 1))
     actions = np.random.default_rng(0).uniform(-1, 1, (2, 2000, 1))
     zeros = np.zeros((2, 2000, 1))
-    agent.remember(zeros, actions, -np.square(actions[..., 0] - 0.3), zeros, np.ones((2, 2000)))
+    agent.add_transitions(zeros, actions, -np.square(actions[..., 0] - 0.3), zeros, np.ones((2, 2000)))
     agent.train(1500)
     np.testing.assert_allclose(agent.act(np.zeros((2, 1, 1))), 0.3, atol=0.15)
     probed = np.linspace(-0.9, 0.9, 7)[None, :, None].repeat(2, axis=0)
