@@ -23,6 +23,7 @@ from pbcs_ompl.agents.losses import ActionBox, Network, critic_loss, imitation_l
 from pbcs_ompl.agents.replay import Batch
 from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
+from pbcs_ompl.core.options import check_range
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class DDPGArgmaxSettings(AgentSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.require("candidates", self.candidates >= 1, "at least 1")
+        check_range("candidates", self.candidates, self.candidates >= 1, "at least 1")
 
 
 class DDPGArgmax(StackedAgent):

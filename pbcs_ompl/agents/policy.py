@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbcs_ompl.agents.kernels.network import outputs
-from pbcs_ompl.core.types import Array
 from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.core.types import Array
 
 Float32Array = NDArray[np.float32]
 LAYER_NORM_EPSILON = 1e-5

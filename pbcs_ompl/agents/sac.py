@@ -22,6 +22,7 @@ from pbcs_ompl.agents.policy import to_box
 from pbcs_ompl.agents.replay import Batch
 from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
+from pbcs_ompl.core.options import check_range
 from pbcs_ompl.core.types import Array
 
 
@@ -42,8 +43,9 @@ class SACSettings(AgentSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.require("temperature", self.temperature > 0.0, "a positive number")
-        self.require("temperature_learning_rate", self.temperature_learning_rate >= 0.0, "at least 0")
+        check_range("temperature", self.temperature, self.temperature > 0.0, "a positive number")
+        rate = self.temperature_learning_rate
+        check_range("temperature_learning_rate", rate, rate >= 0.0, "at least 0")
 
 
 class SAC(StackedAgent):

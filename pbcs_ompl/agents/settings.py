@@ -8,10 +8,10 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from importlib.resources import files
-from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
-from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
+from pbcs_ompl.core.errors import InvalidOption, UnknownName
+from pbcs_ompl.core.options import check_names, check_range, check_types
 
 
 def preset_names() -> list[str]:
@@ -67,28 +67,16 @@ class AgentSettings:
     def __post_init__(self) -> None:
         if isinstance(self.hidden, list):
             object.__setattr__(self, "hidden", tuple(self.hidden))
-        for field in fields(self):
-            kind = type(field.default)
-            self.require(field.name, _is_a(kind, getattr(self, field.name)), f"a value of type {kind.__name__}")
+        types = {field.name: type(field.default) for field in fields(self)}
+        check_types({name: getattr(self, name) for name in types}, types)
         widths = [isinstance(width, int) and width > 0 for width in self.hidden]
-        self.require("hidden", bool(widths) and all(widths), "positive whole numbers")
+        check_range("hidden", self.hidden, bool(widths) and all(widths), "positive whole numbers")
         for name in ("actor_learning_rate", "critic_learning_rate"):
-            self.require(name, getattr(self, name) > 0.0, "a positive number")
+            check_range(name, getattr(self, name), getattr(self, name) > 0.0, "a positive number")
         for name in ("batch_size", "replay_capacity"):
-            self.require(name, getattr(self, name) >= 1, "a positive number")
-        self.require("discount", 0.0 <= self.discount < 1.0, "in [0, 1)")
-        self.require("polyak", 0.0 <= self.polyak <= 1.0, "in [0, 1]")
-
-    def require(self, name: str, holds: bool, expected: str) -> None:
-        """Raise an InvalidOption unless the condition on the setting `name` holds.
-
-        Args:
-            name: Of the setting.
-            holds: Whether its value is in its range.
-            expected: The range in words.
-        """
-        if not holds:
-            raise InvalidOption(f"{name} is {getattr(self, name)!r}, expected {expected}")
+            check_range(name, getattr(self, name), getattr(self, name) >= 1, "a positive number")
+        check_range("discount", self.discount, 0.0 <= self.discount < 1.0, "in [0, 1)")
+        check_range("polyak", self.polyak, 0.0 <= self.polyak <= 1.0, "in [0, 1]")
 
     @classmethod
     def from_preset(cls, name: str, **changes: Any) -> Self:
@@ -102,7 +90,7 @@ class AgentSettings:
         if cls.algorithm not in tables and "common" not in tables:
             raise InvalidOption(f"preset {name!r} has no settings for {cls.algorithm!r}")
         values = tables.get("common", {}) | tables.get(cls.algorithm, {}) | changes
-        cls._check_names(values)
+        check_names(f"agent {cls.algorithm!r}", "setting", values, [field.name for field in fields(cls)])
         return cls(**values)
 
     def to_dict(self) -> dict[str, Any]:
@@ -116,21 +104,9 @@ class AgentSettings:
         Raises:
             InvalidOption: an unknown or a missing setting, or a value of the wrong type or out of its range.
         """
-        cls._check_names(values)
+        check_names(f"agent {cls.algorithm!r}", "setting", values, [field.name for field in fields(cls)])
         missing = [field.name for field in fields(cls) if field.name not in values]
         if missing:
-            raise InvalidOption(f"settings of {cls.algorithm} without {', '.join(missing)}; expected all of them")
+            raise InvalidOption(f"agent {cls.algorithm!r}: the setting {missing[0]!r} is missing; expected all of "
+                                f"{', '.join(field.name for field in fields(cls))}")
         return cls(**values)
-
-    @classmethod
-    def _check_names(cls, values: Mapping[str, Any]) -> None:
-        known = [field.name for field in fields(cls)]
-        for name in values:
-            if name not in known:
-                raise InvalidOption(f"unknown setting {name!r} of {cls.algorithm}{did_you_mean(name, known)}")
-
-
-def _is_a(kind: type, value: Any) -> bool:
-    """Return whether a value may stand where this type is expected: a whole number for any number, too."""
-    wider: dict[type, type] = {float: Real, int: Integral}
-    return isinstance(value, wider.get(kind, kind)) and isinstance(value, bool) == (kind is bool)

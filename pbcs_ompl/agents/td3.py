@@ -16,6 +16,7 @@ from pbcs_ompl.agents.losses import critic_loss, policy_loss, td_targets
 from pbcs_ompl.agents.replay import Batch
 from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
+from pbcs_ompl.core.options import check_range
 
 
 @dataclass(frozen=True)
@@ -36,9 +37,9 @@ class TD3Settings(AgentSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.require("target_noise", self.target_noise >= 0.0, "at least 0")
-        self.require("target_noise_clip", self.target_noise_clip >= 0.0, "at least 0")
-        self.require("policy_delay", self.policy_delay >= 1, "at least 1")
+        check_range("target_noise", self.target_noise, self.target_noise >= 0.0, "at least 0")
+        check_range("target_noise_clip", self.target_noise_clip, self.target_noise_clip >= 0.0, "at least 0")
+        check_range("policy_delay", self.policy_delay, self.policy_delay >= 1, "at least 1")
 
 
 class TD3(StackedAgent):
