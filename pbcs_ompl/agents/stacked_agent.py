@@ -94,7 +94,7 @@ class StackedAgent(ABC):
         self._trained = self.make_networks([torch.Generator().manual_seed(number) for number in numbers])
         self.replay = Replay(observation_size, self.action_size, seeds=self.seeds,
                              capacity=self.settings.replay_capacity, device=self.device)
-        self._run_update = compiled(self._update_rows, compile, self.device)
+        self._run_update = compiled(self._update_rows, compile, self.device, record=not self.gradients)
 
     def make_networks(self, generators: Sequence[torch.Generator]) -> dict[str, TrainedNetwork | TrainedScalar]:
         """Return all that is trained, by name; an algorithm that trains more than actor and critic adds to it."""
@@ -331,7 +331,7 @@ class StackedAgent(ABC):
                 for part, tensor in trained.tensors().items()}
 
     def part(self, seeds: Sequence[int]) -> dict[str, Tensor]:
-        """Return copies of `_tensors()` for some seeds, by their indices."""
+        """Return copies of `tensors()` for some seeds, by their indices."""
         return {f"{name}/{part}": tensor for name, trained in self._trained.items()
                 for part, tensor in trained.part(seeds, len(self.seeds)).items()}
 

@@ -30,12 +30,19 @@ def choose_device(name: str | torch.device) -> torch.device:
     return device
 
 
-def compiled(function: Callable[..., Any], compile: Compile, device: torch.device) -> Callable[..., Any]:
+def compiled(function: Callable[..., Any], compile: Compile, device: torch.device, *,
+             record: bool) -> Callable[..., Any]:
     """Return `function`, compiled by torch when asked for; "auto" does so on CUDA only.
 
     On a CPU the hand-written gradients leave torch's compiler 5 to 20 %, for which it would take 5 to 40 s;
     there an algorithm may have a kernel, which is faster than both. When compilation fails, the function
     runs uncompiled, with one warning.
+
+    Args:
+        function: What is compiled.
+        compile: True, False or "auto".
+        device: Where it will run.
+        record: Whether autograd records losses in it.
 
     Raises:
         InvalidOption: `compile` is none of True, False, "auto".
@@ -44,7 +51,7 @@ def compiled(function: Callable[..., Any], compile: Compile, device: torch.devic
         raise InvalidOption(f"compile is {compile!r}, expected True, False or 'auto'")
     if compile is False or (compile == "auto" and device.type == "cpu"):
         return function
-    return _CompiledOrNot(function)
+    return _CompiledOrNot(function, record)
 
 
 class _CompiledOrNot:
@@ -53,9 +60,10 @@ class _CompiledOrNot:
     A compilation fails before anything has run, so nothing is done twice.
     """
 
-    def __init__(self, function: Callable[..., Any]):
+    def __init__(self, function: Callable[..., Any], record: bool):
         self._plain = function
-        self._chosen: Callable[..., Any] = torch.compile(function, fullgraph=True, dynamic=False)
+        chosen: Callable[..., Any] = torch.compile(function, fullgraph=True, dynamic=False)
+        self._chosen = _trace_autograd(chosen) if record else chosen
 
     def __call__(self, *arguments: Any) -> Any:
         try:
@@ -68,6 +76,14 @@ class _CompiledOrNot:
             warnings.warn(message, RuntimeWarning, stacklevel=2)
             self._chosen = self._plain
             return self._plain(*arguments)
+
+
+def _trace_autograd(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Let torch's compiler trace the gradients of losses; versions that cannot do it refuse to compile them."""
+    if "trace_autograd_ops" not in torch._dynamo.config.get_config_copy():
+        return function
+    traced: Callable[..., Any] = torch._dynamo.config.patch(trace_autograd_ops=True)(function)
+    return traced
 
 
 @contextmanager
