@@ -52,12 +52,12 @@ class StableTD3:
         with torch.no_grad():
             return self.model.critic.q1_forward(*pair).cpu().numpy().T.astype(np.float64)
 
-    def remember(self, observations, actions, rewards, next_observations, terminals):
+    def add_transitions(self, observations, actions, rewards, next_observations, terminals):
         scaled = self.model.policy.scale_action(actions[0])
         for row in zip(observations[0], next_observations[0], scaled, rewards[0], terminals[0], strict=True):
             self.model.replay_buffer.add(*row, [{}])
 
-    def forget(self):
+    def clear_replay(self):
         self.model.replay_buffer.reset()
 
     def train(self, num_updates):

@@ -1,4 +1,4 @@
-"""Agents: DDPG, TD3, SAC and two cures of DDPG, stacked over seeds. Everything that needs torch lies here or above.
+"""Agents: DDPG, TD3, SAC and two variants of DDPG, stacked over seeds. Subpackages below it need no torch.
 
 Raises:
     MissingDependency: at import, when torch or safetensors is not installed.
@@ -7,7 +7,7 @@ Raises:
 from pbcs_ompl.core.errors import MissingDependency
 
 try:
-    import safetensors  # noqa: F401 - skills save with it; better to know before a training than after it
+    import safetensors  # noqa: F401 - skills save with it; a missing library is reported before training
     import torch  # noqa: F401
 except ModuleNotFoundError as error:
     raise MissingDependency(
@@ -18,9 +18,8 @@ from pbcs_ompl.agents.ddpg_argmax import DDPGArgmax, DDPGArgmaxSettings
 from pbcs_ompl.agents.ddpg_regression import DDPGRegression, DDPGRegressionSettings
 from pbcs_ompl.agents.noise import EpsilonGreedy, Gaussian, OrnsteinUhlenbeck, make_noise
 from pbcs_ompl.agents.policy import Policy
-from pbcs_ompl.agents.presets import preset_names
 from pbcs_ompl.agents.sac import SAC, SACSettings
-from pbcs_ompl.agents.settings import AgentSettings
+from pbcs_ompl.agents.settings import AgentSettings, preset_names, preset_version
 from pbcs_ompl.agents.stacked_agent import NonFiniteData, StackedAgent
 from pbcs_ompl.agents.td3 import TD3, TD3Settings
 
@@ -44,4 +43,5 @@ __all__ = [
     "TD3Settings",
     "make_noise",
     "preset_names",
+    "preset_version",
 ]

@@ -1,4 +1,4 @@
-"""DDPG-argmax, [Matheron2020] section 6.6.2: DDPG whose actor is regressed towards the best of some random actions.
+"""DDPG-argmax, [Matheron2020] section 6.6.2: DDPG whose actor imitates the best of some random actions.
 
 The critic is that of DDPG (Eq. 1.2), and still learns from the target actor; the policy gradient (Eq. 1.5) is replaced:
 
@@ -10,19 +10,20 @@ Differs: the loss is a mean over the mini-batch, and distances are measured in h
 dimensions of an action weigh the same.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents.kernels.counter_rng import uniform
+from pbcs_ompl.agents.kernels.gradients import GRADIENTS
+from pbcs_ompl.agents.losses import ActionBox, Network, critic_loss, imitation_loss
 from pbcs_ompl.agents.replay import Batch
 from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
-from pbcs_ompl.agents.streams import uniform
-from pbcs_ompl.agents.trained_network import TrainedNetwork
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.options import check_range
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class DDPGArgmaxSettings(AgentSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require("candidates", self.candidates >= 1, "at least 1")
+        check_range("candidates", self.candidates, self.candidates >= 1, "at least 1")
 
 
 class DDPGArgmax(StackedAgent):
@@ -47,56 +48,33 @@ class DDPGArgmax(StackedAgent):
 
     settings_type = DDPGArgmaxSettings
     settings: DDPGArgmaxSettings
+    gradients = GRADIENTS
 
-    def _make_networks(self, generators: Sequence[torch.Generator]) -> dict[str, TrainedNetwork]:
-        self._actor = self._network(self.observation_size, self.action_size, generators)
-        self._critic = self._network(self.observation_size + self.action_size, 1, generators)
-        return {"actor": self._actor, "critic": self._critic}
+    def update_inputs(self, first: int, count: int) -> Iterable[tuple[Any, ...]]:
+        """Return rates and the candidates [S, N, A], in [-1, 1]."""
+        drawn = uniform(self.stream_keys, first, count, (self.settings.candidates, self.action_size))
+        return zip(*self.adam_rates(first, count), torch.from_numpy(2.0 * drawn - 1.0).to(self.device), strict=True)
 
-    def _inputs(self, first: int, count: int) -> Iterable[tuple[Any, ...]]:
-        numbers, settings = range(first, first + count), self.settings
-        rates = [self._adam_rates(rate, numbers)
-                 for rate in (settings.critic_learning_rate, settings.actor_learning_rate)]
-        drawn = uniform(self._noise_keys, first, count, (settings.candidates, self.action_size))
-        return zip(*rates, torch.from_numpy(2.0 * drawn - 1.0).to(self.device), strict=True)
+    def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor, candidates: Tensor) -> dict[str, Tensor]:
+        """Make one update; see `StackedAgent.update`."""
+        values = self.minimise(self.critic, critic_rate, critic_loss, batch.obs_actions, self.td_targets(batch))
+        best = best_candidates(self.critic.weights, batch.observations, candidates, self.box)
+        distance = self.minimise(self.actor, actor_rate, imitation_loss, batch.observations, best)
+        self.update_targets()
+        return {"critic_loss": values, "actor_loss": distance}
 
-    def _update(self, rows: Tensor, critic_rate: Tensor, actor_rate: Tensor, candidates: Tensor) -> dict[str, Tensor]:
-        batch = self._replay.unpack(rows)
-        critic_loss = self._critic.regress(batch.pairs, self._targets(batch))
-        self._critic.descend(critic_rate)
-        actor_loss = self._actor_gradient(batch, candidates)
-        self._actor.descend(actor_rate)
-        self._actor.follow(self.settings.polyak)
-        self._critic.follow(self.settings.polyak)
-        return {"critic_loss": critic_loss, "actor_loss": actor_loss}
 
-    def _targets(self, batch: Batch) -> Tensor:
-        """Return y = r + discount Q'(s', pi'(s')) [S, B, 1], terminal transitions aside (Eq. 1.2)."""
-        unit = self._actor.target_values(batch.next_observations).tanh_()
-        next_pairs = torch.cat((batch.next_observations, self._on_box(unit)), dim=2)
-        next_values = self._critic.target_values(next_pairs)
-        return torch.addcmul(batch.rewards, batch.continues, next_values, value=self.settings.discount)
+def best_candidates(critic: Network, observations: Tensor, candidates: Tensor, box: ActionBox) -> Tensor:
+    """Return the candidate with the largest value for each observation [S, B, A].
 
-    def _best(self, observations: Tensor, candidates: Tensor) -> Tensor:
-        """Return, for each observation [S, B, O], the candidate [S, N, A] that the critic likes best [S, B, A]."""
-        seeds, batch, _ = observations.shape
-        count = candidates.shape[1]
-        every = torch.cat((observations.repeat_interleave(count, dim=1),
-                           self._on_box(candidates).repeat(1, batch, 1)), dim=2)
-        choice = self._critic.values(every).view(seeds, batch, count).argmax(dim=2)
-        return candidates.gather(1, choice[:, :, None].expand(-1, -1, candidates.shape[2]))
-
-    def _actor_gradient(self, batch: Batch, candidates: Tensor) -> Tensor:
-        """Return the mean over the batch of (pi(s) - c)^2 [S]; leave its gradient in the actor."""
-        best = self._best(batch.observations, candidates)
-        outputs, tape = self._actor.network.forward(self._actor.weights, batch.observations)
-        unit = outputs.tanh()
-        errors = unit - best
-        slope = torch.ops.aten.tanh_backward(errors * (2.0 / errors.shape[1]), unit)
-        self._actor.network.backward(self._actor.weights, tape, slope, self._actor.gradient)
-        return errors.square().sum(dim=2).mean(dim=1)
-
-    def value(self, observations: Array, actions: Array) -> Array:
-        """Return the critics' values [S, B] of actions [S, B, A] in observations [S, B, O]."""
-        with torch.inference_mode():
-            return self._critic.values(self._pairs(observations, actions)).squeeze(2).double().cpu().numpy()
+    Args:
+        critic: Q.
+        observations: [S, B, O].
+        candidates: Actions in [-1, 1] [S, N, A].
+        box: Of the actions.
+    """
+    seeds, batch, _ = observations.shape
+    count = candidates.shape[1]
+    every = torch.cat((observations.repeat_interleave(count, dim=1), box.scale(candidates).repeat(1, batch, 1)), dim=2)
+    choice = critic(every).view(seeds, batch, count).argmax(dim=2)
+    return candidates.gather(1, choice[:, :, None].expand(-1, -1, candidates.shape[2]))

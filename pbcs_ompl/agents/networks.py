@@ -1,20 +1,27 @@
-"""Multi-layer perceptrons stacked over seeds: S networks of one shape, in one flat buffer.
+"""Multi-layer perceptrons stacked over seeds, and their training: targets, Adam, gradients by autograd.
 
-All parameters of a stack lie in one tensor, so that an optimiser or a moving average is a few flat
-operations; the layers see views of it. Gradients are derived by hand (`backward`): for networks this small,
-recording a graph costs half as much as the arithmetic. They equal torch.autograd's, and torch.compile takes
-them as they are.
+All parameters of a stack lie in one buffer, so that an optimiser step or a Polyak update is a few flat operations; the
+layers are views of it. A loss takes a `Weights`, which is called as a function of inputs, and returns one number for
+each network of the stack.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents.kernels.network import BETA_1, BETA_2
 from pbcs_ompl.agents.policy import LAYER_NORM_EPSILON
+
+ADAM_EPSILON = 1e-8
+"""Of Adam (Kingma and Ba, 2015), as are the two decay rates of its moments."""
+
+Loss = Callable[..., Any]
+"""Losses [S] of a stack, or a tuple that begins with them, as a function of its `Weights` and more arguments."""
 
 
 class Norm(NamedTuple):
@@ -33,33 +40,19 @@ class Layer(NamedTuple):
     """[S, 1, out]"""
     norm: Norm | None
 
+    def tensors(self) -> list[Tensor]:
+        """Return all parameters: weight, bias, and gain and shift where there are some."""
+        return [self.weight, self.bias, *(self.norm or ())]
 
-class Weights:
-    """The parameters (or the gradients) of a stack: a buffer and its layers, which are views of it."""
-
-    def __init__(self, network: "MLP", flat: Tensor):
-        self.flat = flat
-        self._network = network
-        self._layers = network.split(flat)
-
-    @property
-    def layers(self) -> list[Layer]:
-        # A compiler must see that the views alias the buffer; eager code saves the time of making them.
-        return self._network.split(self.flat) if torch.compiler.is_compiling() else self._layers
-
-
-class Tape(NamedTuple):
-    """What a forward pass leaves for the backward pass."""
-
-    inputs: list[Tensor]
-    """The input of every layer [S, B, in]."""
-    norms: list[tuple[Tensor, Tensor]]
-    """Normalised values [S, B, out] and inverse deviations [S, B, 1] of every layer norm."""
+    def map(self, change: Callable[[Tensor], Tensor]) -> "Layer":
+        """Return a layer of changed parameters."""
+        norm = None if self.norm is None else Norm(change(self.norm.gain), change(self.norm.shift))
+        return Layer(change(self.weight), change(self.bias), norm)
 
 
 @dataclass(frozen=True)
 class MLP:
-    """ReLU network with a linear output layer; the parameters are kept apart.
+    """The shape of a ReLU network with a linear output layer; its parameters are kept apart, in `Weights`.
 
     Args:
         sizes: Width of the input, of every hidden layer, and of the output.
@@ -90,11 +83,10 @@ class MLP:
                                 Norm(take(1, after), take(1, after)) if normed else None))
         return layers
 
-    def take(self, flat: Tensor, members: Sequence[int]) -> Tensor:
-        """Return the buffer of some networks of a stack, by their places in it."""
+    def select(self, flat: Tensor, members: Sequence[int]) -> Tensor:
+        """Return a copy of the buffer of some networks of a stack, by their indices."""
         chosen = torch.tensor(members, device=flat.device)
-        return torch.cat([block[chosen].flatten() for layer in self.split(flat)
-                          for block in (layer.weight, layer.bias, *(layer.norm or ()))])
+        return torch.cat([block[chosen].flatten() for layer in self.split(flat) for block in layer.tensors()])
 
     def initial(self, generators: Sequence[torch.Generator]) -> Tensor:
         """Draw parameters [S * P] as torch.nn.Linear does, each seed's from its own generator.
@@ -112,63 +104,158 @@ class MLP:
                 layer.norm.shift.zero_()
         return flat
 
-    def forward(self, weights: Weights, inputs: Tensor) -> tuple[Tensor, Tape]:
-        """Return the outputs [S, B, out] for inputs [S, B, in], and what `backward` needs."""
-        tape = Tape([], [])
-        *hidden, last = weights.layers
+
+class Weights:
+    """The parameters of a stack: a buffer and its layers, which are views of it. Called, it is the network.
+
+    Args:
+        network: The shape of the networks.
+        flat: The buffer [S * P].
+        layers: Other tensors than the views of the buffer, such as leaves of autograd.
+    """
+
+    def __init__(self, network: MLP, flat: Tensor, layers: list[Layer] | None = None):
+        self.network, self.flat = network, flat
+        self._given = layers is not None
+        self._layers = network.split(flat) if layers is None else layers
+
+    @property
+    def layers(self) -> list[Layer]:
+        """The layers, from the inputs to the outputs."""
+        # A compiler must see that the views alias the buffer; eager code saves the time of making them.
+        return self.network.split(self.flat) if torch.compiler.is_compiling() and not self._given else self._layers
+
+    def first(self, count: int) -> "Weights":
+        """Return the first `count` networks of the stack, as views."""
+        return Weights(self.network, self.flat, [layer.map(lambda block: block[:count]) for layer in self.layers])
+
+    def __call__(self, inputs: Tensor) -> Tensor:
+        """Return the outputs [S, B, out] for inputs [S, B, in]."""
+        *hidden, last = self.layers
         values = inputs
         for weight, bias, norm in hidden:
-            tape.inputs.append(values)
             values = torch.baddbmm(bias, values, weight)
             if norm is not None:
-                normal, _, deviation = torch.native_layer_norm(
-                    values, values.shape[-1:], None, None, LAYER_NORM_EPSILON)
-                tape.norms.append((normal, deviation))
+                normal, _, _ = torch.native_layer_norm(values, values.shape[-1:], None, None, LAYER_NORM_EPSILON)
                 values = torch.addcmul(norm.shift, normal, norm.gain)
             values = values.relu_()
-        tape.inputs.append(values)
-        return torch.baddbmm(last.bias, values, last.weight), tape
+        return torch.baddbmm(last.bias, values, last.weight)
 
-    def backward(self, weights: Weights, tape: Tape, slope: Tensor, gradient: Weights) -> None:
-        """Fill `gradient` with the derivative of the loss by the parameters.
 
-        Args:
-            tape: Of `forward` with these weights.
-            slope: Derivative of the loss by the outputs [S, B, out].
+class TrainedNetwork:
+    """A stack of networks of one shape, trained by Adam, with target networks that follow slowly.
+
+    Attributes:
+        weights: The networks.
+        target: Their targets.
+        gradient: Where `autograd`, or a kernel in its place, leaves the gradient of a loss.
+        mean, square: Adam's moments [S * P].
+    """
+
+    def __init__(self, network: MLP, generators: Sequence[torch.Generator], device: torch.device):
+        self.network = network
+        initial = network.initial(generators).to(device)
+        self.weights = Weights(network, initial)
+        self.target = Weights(network, initial.clone())
+        self.gradient = Weights(network, torch.zeros_like(initial))
+        self.mean = torch.zeros_like(initial)
+        self.square = torch.zeros_like(initial)
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Return everything that must be saved, each [S * P]."""
+        return {"weights": self.weights.flat, "target": self.target.flat,
+                "mean": self.mean, "square": self.square}
+
+    def part(self, seeds: Sequence[int], count: int) -> dict[str, Tensor]:
+        """Return copies of `tensors()` for some seeds, by their indices among all `count`.
+
+        Where there are several networks of each seed, the first ones of all seeds come first.
         """
-        self._descend(weights.layers, tape, slope, gradient.layers)
+        copies = self.weights.flat.numel() // self.network.num_parameters // count
+        members = [copy * count + seed for copy in range(copies) for seed in seeds]
+        return {name: self.network.select(flat, members) for name, flat in self.tensors().items()}
 
-    def input_slope(self, weights: Weights, tape: Tape, slope: Tensor) -> Tensor:
-        """Return the derivative of the loss by the inputs [S, B, in]; see `backward`."""
-        layers = weights.layers
-        slope = self._descend(layers, tape, slope, None)
-        return torch.bmm(slope, layers[0].weight.transpose(1, 2))
+    def autograd(self, loss: Loss, *arguments: Any) -> Any:
+        """Return loss(weights, *arguments); leave the gradient of the sum of its losses in `gradient`."""
+        with torch.enable_grad():
+            layers = [layer.map(_leaf) for layer in self.weights.layers]
+            outcome = loss(Weights(self.network, self.weights.flat, layers), *arguments)
+            leaves = [block for layer in layers for block in layer.tensors()]
+            gradients = _gradients(outcome, leaves)
+        for block, gradient in zip((block for layer in self.gradient.layers for block in layer.tensors()),
+                                   gradients, strict=True):
+            block.copy_(gradient)
+        return _detached(outcome)
 
-    @staticmethod
-    def _descend(layers: list[Layer], tape: Tape, slope: Tensor, gradients: list[Layer] | None) -> Tensor:
-        """Return the derivative by the first layer's sums [S, B, hidden]; fill `gradients` on the way."""
-        last = len(layers) - 1
-        for index in range(last, -1, -1):
-            into = None if gradients is None else gradients[index]
-            norm = layers[index].norm
-            if index < last:
-                slope = torch.ops.aten.threshold_backward(slope, tape.inputs[index + 1], 0.0)
-            if norm is not None:
-                learnt = None if into is None else into.norm
-                slope = _norm_backward(norm.gain, tape.norms[index], slope, learnt)
-            if into is not None:
-                torch.bmm(tape.inputs[index].transpose(1, 2), slope, out=into.weight)
-                torch.sum(slope, 1, keepdim=True, out=into.bias)
-            if index > 0:
-                slope = torch.bmm(slope, layers[index].weight.transpose(1, 2))
-        return slope
+    def step(self, rate: Tensor) -> None:
+        """Make one step of Adam against `gradient`; `rate` is one row of `adam_rates`."""
+        _adam_step(self.weights.flat, self.gradient.flat, self.mean, self.square, rate)
+
+    def update_target(self, polyak: float) -> None:
+        """Make a Polyak update: target <- polyak target + (1 - polyak) weights."""
+        self.target.flat.lerp_(self.weights.flat, 1.0 - polyak)
 
 
-def _norm_backward(gain: Tensor, norm: tuple[Tensor, Tensor], slope: Tensor, into: Norm | None) -> Tensor:
-    normal, deviation = norm
-    if into is not None:
-        torch.sum(slope * normal, 1, keepdim=True, out=into.gain)
-        torch.sum(slope, 1, keepdim=True, out=into.shift)
-    slope = slope * gain
-    along = (slope * normal).mean(-1, keepdim=True)
-    return (slope - slope.mean(-1, keepdim=True)).addcmul(normal, along, value=-1.0).mul(deviation)
+class TrainedScalar:
+    """One number for each seed [S], trained by Adam; see `TrainedNetwork`."""
+
+    def __init__(self, values: Tensor, device: torch.device):
+        self.values = values.to(device)
+        self.gradient, self.mean, self.square = (torch.zeros_like(self.values) for _ in range(3))
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Return everything that must be saved, each [S]."""
+        return {"values": self.values, "mean": self.mean, "square": self.square}
+
+    def part(self, seeds: Sequence[int], count: int) -> dict[str, Tensor]:
+        """Return copies of `tensors()` for some seeds, by their indices among all `count`."""
+        return {name: tensor[list(seeds)] for name, tensor in self.tensors().items()}
+
+    def autograd(self, loss: Loss, *arguments: Any) -> Any:
+        """Return loss(values, *arguments); leave the gradient of the sum of its losses in `gradient`."""
+        with torch.enable_grad():
+            leaf = _leaf(self.values)
+            outcome = loss(leaf, *arguments)
+            (gradient,) = _gradients(outcome, [leaf])
+        self.gradient.copy_(gradient)
+        return _detached(outcome)
+
+    def step(self, rate: Tensor) -> None:
+        """Make one step of Adam against `gradient`; `rate` is one row of `adam_rates`."""
+        _adam_step(self.values, self.gradient, self.mean, self.square, rate)
+
+
+def _leaf(block: Tensor) -> Tensor:
+    return block.detach().requires_grad_()
+
+
+def _gradients(outcome: Any, leaves: list[Tensor]) -> tuple[Tensor, ...]:
+    losses = outcome[0] if isinstance(outcome, tuple) else outcome
+    return torch.autograd.grad(losses.sum(), leaves)
+
+
+def _detached(outcome: Any) -> Any:
+    return tuple(part.detach() for part in outcome) if isinstance(outcome, tuple) else outcome.detach()
+
+
+def _adam_step(weights: Tensor, gradient: Tensor, mean: Tensor, square: Tensor, rate: Tensor) -> None:
+    step_size, epsilon = rate.unbind()
+    mean.lerp_(gradient, 1.0 - BETA_1)
+    square.mul_(BETA_2).addcmul_(gradient, gradient, value=1.0 - BETA_2)
+    weights.sub_(mean.div(square.sqrt().add_(epsilon)).mul_(step_size))
+
+
+def adam_rates(learning_rate: float, numbers: Iterable[int], device: torch.device) -> Tensor:
+    """Return step sizes and epsilons [K, 2] of Adam's steps with these K numbers (counted from 1).
+
+    Kingma and Ba's own reordering takes both bias corrections out of the loop over the parameters.
+
+    Args:
+        learning_rate: Adam's alpha.
+        numbers: Which steps.
+        device: Where the result lies.
+    """
+    steps = np.array(list(numbers), dtype=np.float64)
+    correction = np.sqrt(1.0 - BETA_2**steps)
+    rates = np.stack([learning_rate * correction / (1.0 - BETA_1**steps), ADAM_EPSILON * correction], axis=1)
+    return torch.from_numpy(rates.astype(np.float32)).to(device)

@@ -1,11 +1,11 @@
-"""Exploration noise: how the actions that are tried differ from those of the actor, [Matheron2020] section 6.2.2.
+"""Exploration noise: makes the actions of an episode from those of the actor, [Matheron2020] section 6.2.2.
 
     noise = make_noise("ornstein-uhlenbeck", sigma=0.3)
     draws = draw_all(noise, generators, (steps, copies), action_size)      # [S, T, B, n], of many steps at once
-    tried = noise.apply(agent.act(observations), draws[:, t], fresh, low, high)
+    actions = noise.apply(agent.act(observations), draws[:, t], starts, low, high)
 
-All random numbers of a seed come from its own generator, whatever the actions are and whatever is replaced, so that a
-stack of S seeds explores as S separate agents do.
+All random numbers of a seed come from its own generator, and how many does not depend on the actions: a stack of S
+seeds explores as S separate agents do.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,28 +15,35 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
+from pbcs_ompl.core.errors import UnknownName
+from pbcs_ompl.core.options import check_names, check_range
 from pbcs_ompl.core.types import Array, BoolArray
 
 
 class Noise(Protocol):
-    """Turns the actors' actions into those that are tried."""
+    """Turns the actors' actions into those of an episode."""
 
     def keep(self, indices: Sequence[int]) -> None:
-        """Go on with some of the seeds, by their places: the next `apply` is for them only."""
+        """Continue with some of the seeds, by their indices: the next `apply` is for them only."""
         ...
 
     def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
-        """Return the random numbers [*shape, n] that `apply` wants."""
+        """Return the random numbers [*shape, n] that `apply` takes.
+
+        Args:
+            generator: Of one seed.
+            shape: Steps, copies of the environment, or whatever else.
+            action_size: A.
+        """
         ...
 
-    def apply(self, actions: Array, draws: Array, fresh: BoolArray, low: Array, high: Array) -> Array:
-        """Return the actions to be tried [S, B, A].
+    def apply(self, actions: Array, draws: Array, starts: BoolArray, low: Array, high: Array) -> Array:
+        """Return the noisy actions [S, B, A].
 
         Args:
             actions: The actors' [S, B, A].
             draws: The numbers of this step [S, B, n].
-            fresh: Where an episode begins with this step [S, B].
+            starts: Whether an episode begins with this step [S, B].
             low, high: The action box [A].
         """
         ...
@@ -49,30 +56,28 @@ class EpsilonGreedy:
     epsilon: float = 0.1
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.epsilon <= 1.0:
-            raise InvalidOption(f"epsilon is {self.epsilon}, expected a probability in [0, 1]")
+        check_range("epsilon", self.epsilon, 0.0 <= self.epsilon <= 1.0, "a probability in [0, 1]")
 
     def keep(self, indices: Sequence[int]) -> None:
         """Do nothing: this noise has no memory."""
 
     def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:
-        """Draw whether to explore, and where to."""
+        """Draw whether the action is replaced, and by which."""
         return generator.random((*shape, 1 + action_size))
 
-    def apply(self, actions: Array, draws: Array, fresh: BoolArray, low: Array, high: Array) -> Array:
+    def apply(self, actions: Array, draws: Array, starts: BoolArray, low: Array, high: Array) -> Array:
         """Replace some of the actions."""
         return np.where(draws[..., :1] < self.epsilon, low + draws[..., 1:] * (high - low), actions)
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Independent normal noise of deviation `sigma`, in units of half the box; as in Spinning Up (2018)."""
+    """Independent normal noise of standard deviation `sigma`, in half-widths of the box; as in Spinning Up (2018)."""
 
     sigma: float = 0.1
 
     def __post_init__(self) -> None:
-        if not self.sigma >= 0.0:
-            raise InvalidOption(f"sigma is {self.sigma}, expected at least 0")
+        check_range("sigma", self.sigma, self.sigma >= 0.0, "at least 0")
 
     def keep(self, indices: Sequence[int]) -> None:
         """Do nothing: this noise has no memory."""
@@ -81,21 +86,27 @@ class Gaussian:
         """Draw normal numbers."""
         return generator.standard_normal((*shape, action_size))
 
-    def apply(self, actions: Array, draws: Array, fresh: BoolArray, low: Array, high: Array) -> Array:
-        """Add the noise; the sum is cut off at the box."""
+    def apply(self, actions: Array, draws: Array, starts: BoolArray, low: Array, high: Array) -> Array:
+        """Add the noise; the sum is clipped to the box."""
         return np.clip(actions + self.sigma * draws * (high - low) / 2.0, low, high)
 
 
 class OrnsteinUhlenbeck:
-    """Add x to the action, in units of half the box: x <- x - theta x dt + sigma sqrt(dt) N(0, 1).
+    """Add x to the action, in half-widths of the box: x <- x - theta x dt + sigma sqrt(dt) N(0, 1).
 
     x is 0 before the first step of an episode. Source: Lillicrap et al. 2015; the values are those of OpenAI Baselines
     (2018), [Matheron2020] 6.2.2 gives none.
+
+    Args:
+        sigma: Standard deviation of the noise in a unit of time.
+        theta: How fast x decays.
+        dt: Time of one step.
     """
 
     def __init__(self, sigma: float = 0.2, theta: float = 0.15, dt: float = 1e-2):
-        if not (sigma >= 0.0 and 0.0 <= theta * dt <= 1.0 and dt > 0.0):
-            raise InvalidOption(f"sigma={sigma}, theta={theta}, dt={dt}: expected sigma >= 0 and theta dt in [0, 1]")
+        check_range("sigma", sigma, sigma >= 0.0, "at least 0")
+        check_range("dt", dt, dt > 0.0, "a positive number")
+        check_range("theta", theta, 0.0 <= theta * dt <= 1.0, "theta dt in [0, 1]")
         self.sigma, self.theta, self.dt = sigma, theta, dt
         self._x: Array | None = None
 
@@ -107,9 +118,9 @@ class OrnsteinUhlenbeck:
         """Draw normal numbers."""
         return generator.standard_normal((*shape, action_size))
 
-    def apply(self, actions: Array, draws: Array, fresh: BoolArray, low: Array, high: Array) -> Array:
-        """Move x by one step and add it; the sum is cut off at the box."""
-        before = 0.0 if self._x is None else np.where(fresh[..., None], 0.0, self._x)
+    def apply(self, actions: Array, draws: Array, starts: BoolArray, low: Array, high: Array) -> Array:
+        """Move x by one step and add it; the sum is clipped to the box."""
+        before = 0.0 if self._x is None else np.where(starts[..., None], 0.0, self._x)
         self._x = before * (1.0 - self.theta * self.dt) + self.sigma * np.sqrt(self.dt) * draws
         return np.clip(actions + self._x * (high - low) / 2.0, low, high)
 
@@ -127,14 +138,18 @@ def make_noise(name: str, **options: Any) -> Noise:
     """
     if name not in NOISES:
         raise UnknownName("noise", name, NOISES)
-    known = signature(NOISES[name]).parameters
-    for option in options:
-        if option not in known:
-            raise InvalidOption(f"unknown option {option!r} of {name} noise{did_you_mean(option, known)}")
+    check_names(f"noise {name!r}", "option", options, signature(NOISES[name]).parameters)
     return NOISES[name](**options)
 
 
 def draw_all(noise: Noise, generators: Sequence[np.random.Generator], shape: tuple[int, ...],
              action_size: int) -> Array:
-    """Return the draws [S, *shape, n] of all seeds, each from its own generator."""
+    """Return the draws [S, *shape, n] of all seeds, each from its own generator.
+
+    Args:
+        noise: What takes the draws.
+        generators: One for each seed.
+        shape: Of what one seed draws.
+        action_size: A.
+    """
     return np.stack([noise.draw(generator, shape, action_size) for generator in generators])

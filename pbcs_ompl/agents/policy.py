@@ -1,4 +1,4 @@
-"""A policy as plain arrays: what remains of an actor after training, and all that a skill needs."""
+"""A policy as plain arrays: what is kept of an actor after training, and all that a skill needs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbcs_ompl.agents.network_kernels import outputs
+from pbcs_ompl.agents.kernels.network import outputs
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.types import Array
 
@@ -42,7 +42,7 @@ class Policy:
 
     @cached_property
     def _plain(self) -> tuple[tuple[int, ...], Float32Array] | None:
-        """Sizes and one buffer of all parameters, as the kernel wants them; None with layer norm."""
+        """Sizes and one buffer of all parameters, as the kernel takes them; None with layer norm."""
         if any(len(layer) > 2 for layer in self.layers):
             return None
         sizes = (self.observation_size, *(layer[0].shape[1] for layer in self.layers))

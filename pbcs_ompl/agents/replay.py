@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 from torch import Tensor
 
-from pbcs_ompl.agents.streams import hashed, stream_keys
+from pbcs_ompl.agents.kernels.counter_rng import hashed, stream_keys
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 
 FIRST_ALLOCATION = 4096
@@ -19,11 +19,11 @@ class Batch(NamedTuple):
     """Mini-batches of one update: views of rows [S, B, O + A + 2 + O]."""
 
     observations: Tensor
-    pairs: Tensor
-    """Observations and actions side by side [S, B, O + A], as a critic wants them."""
+    obs_actions: Tensor
+    """Observations and actions side by side [S, B, O + A], as a critic takes them."""
     rewards: Tensor
     """[S, B, 1]"""
-    continues: Tensor
+    not_done: Tensor
     """1 - terminal [S, B, 1]"""
     next_observations: Tensor
 
@@ -31,7 +31,7 @@ class Batch(NamedTuple):
 class Replay:
     """Rings of transitions, sampled uniformly with replacement.
 
-    Memory grows as it is filled. A seed's draws are a function of its number and of how many went before,
+    Memory grows as it is filled. A seed's draws are a function of its seed and of how many were made before,
     so a stack of S seeds draws what S separate buffers draw, however many are made at once.
 
     Args:
@@ -83,23 +83,23 @@ class Replay:
         return Batch(rows[..., : self.observation_size], rows[..., :split], rows[..., split : split + 1],
                      rows[..., split + 1 : split + 2], rows[..., split + 2 :])
 
-    def forget(self) -> None:
-        """Empty all rings; the memory and the place in the stream of draws are kept."""
+    def clear(self) -> None:
+        """Empty all rings; the memory and the position in the stream of draws are kept."""
         self.sizes = np.zeros_like(self.sizes)
         self._written = np.zeros_like(self._written)
 
     def state_dict(self, seeds: Sequence[int] | None = None) -> dict[str, np.ndarray]:
-        """Return the contents, up to the longest ring, and the place in the stream of draws.
+        """Return the contents, up to the longest ring, and the position in the stream of draws.
 
         Args:
-            seeds: Which rings, by their places; None for all.
+            seeds: Which rings, by their indices; None for all.
         """
         chosen = np.arange(len(self.sizes)) if seeds is None else np.array(seeds)
         rows = self._rows[torch.from_numpy(chosen).to(self._device), : int(self.sizes[chosen].max())]
         return {"rows": rows.cpu().numpy(), "written": self._written[chosen], "drawn": np.array(self._drawn)}
 
     def can_load(self, state: dict[str, np.ndarray]) -> bool:
-        """Tell whether `state` is of a buffer of this shape."""
+        """Return whether `state` is of a buffer of this shape."""
         if set(state) != {"rows", "written", "drawn"}:
             return False
         rows = state["rows"].shape

@@ -1,11 +1,38 @@
-"""The settings that every algorithm has; each adds its own in a subclass of `AgentSettings`."""
+"""The settings that every algorithm has, and presets: named, versioned settings as data, one TOML file for each.
 
-from dataclasses import dataclass, fields
-from numbers import Integral, Real
+Each algorithm adds its own settings in a subclass of `AgentSettings`. A preset's table [common] holds for all
+algorithms, those that are called like an algorithm for that one.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from importlib.resources import files
 from typing import Any, ClassVar, Self
 
-from pbcs_ompl.agents.presets import make_settings, preset
-from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.errors import InvalidOption, UnknownName
+from pbcs_ompl.core.options import check_names, check_range, check_types
+
+
+def preset_names() -> list[str]:
+    """Return the names of all presets, sorted."""
+    entries = [entry.name for entry in files("pbcs_ompl.agents").iterdir()]
+    return sorted(name.removesuffix(".toml") for name in entries if name.endswith(".toml"))
+
+
+def preset_version(name: str) -> int:
+    """Return the version of a preset, which grows whenever one of its values changes.
+
+    Raises:
+        UnknownName: no such preset; the message suggests the closest one.
+    """
+    return int(_read_preset(name)["version"])
+
+
+def _read_preset(name: str) -> dict[str, Any]:
+    if name not in preset_names():
+        raise UnknownName("preset", name, preset_names())
+    return tomllib.loads(files("pbcs_ompl.agents").joinpath(f"{name}.toml").read_text())
 
 
 @dataclass(frozen=True)
@@ -16,11 +43,14 @@ class AgentSettings:
         algorithm: The name of the algorithm's table in the files of presets.
         hidden: Widths of the hidden layers of actor and critic.
         layer_norm: Normalise the hidden layers.
-        polyak: Share of a target network that stays in each update (1 - tau).
+        actor_learning_rate, critic_learning_rate: Of Adam.
+        batch_size: Transitions in a mini-batch.
+        discount: Of rewards, gamma.
+        polyak: Fraction of a target network that stays in each update (1 - tau).
         replay_capacity: Transitions of each seed that are kept.
 
     Raises:
-        InvalidOption: a value out of its range.
+        InvalidOption: a value of the wrong type or out of its range.
     """
 
     algorithm: ClassVar[str]
@@ -37,21 +67,16 @@ class AgentSettings:
     def __post_init__(self) -> None:
         if isinstance(self.hidden, list):
             object.__setattr__(self, "hidden", tuple(self.hidden))
-        for field in fields(self):
-            kind = type(field.default)
-            self._require(field.name, _is_a(kind, getattr(self, field.name)), f"a value of the kind {kind.__name__}")
+        types = {field.name: type(field.default) for field in fields(self)}
+        check_types({name: getattr(self, name) for name in types}, types)
         widths = [isinstance(width, int) and width > 0 for width in self.hidden]
-        self._require("hidden", bool(widths) and all(widths), "positive whole numbers")
+        check_range("hidden", self.hidden, bool(widths) and all(widths), "positive whole numbers")
         for name in ("actor_learning_rate", "critic_learning_rate"):
-            self._require(name, getattr(self, name) > 0.0, "a positive number")
+            check_range(name, getattr(self, name), getattr(self, name) > 0.0, "a positive number")
         for name in ("batch_size", "replay_capacity"):
-            self._require(name, getattr(self, name) >= 1, "a positive number")
-        self._require("discount", 0.0 <= self.discount < 1.0, "in [0, 1)")
-        self._require("polyak", 0.0 <= self.polyak <= 1.0, "in [0, 1]")
-
-    def _require(self, name: str, holds: bool, expected: str) -> None:
-        if not holds:
-            raise InvalidOption(f"{name} is {getattr(self, name)!r}, expected {expected}")
+            check_range(name, getattr(self, name), getattr(self, name) >= 1, "a positive number")
+        check_range("discount", self.discount, 0.0 <= self.discount < 1.0, "in [0, 1)")
+        check_range("polyak", self.polyak, 0.0 <= self.polyak <= 1.0, "in [0, 1]")
 
     @classmethod
     def from_preset(cls, name: str, **changes: Any) -> Self:
@@ -59,12 +84,29 @@ class AgentSettings:
 
         Raises:
             UnknownName: no such preset.
-            InvalidOption: no such setting, or a value out of its range.
+            InvalidOption: the preset has no values for this algorithm, an unknown setting, or a value out of its range.
         """
-        return make_settings(cls, preset(name, cls.algorithm) | changes)
+        tables = _read_preset(name)
+        if cls.algorithm not in tables and "common" not in tables:
+            raise InvalidOption(f"preset {name!r} has no settings for {cls.algorithm!r}")
+        values = tables.get("common", {}) | tables.get(cls.algorithm, {}) | changes
+        check_names(f"agent {cls.algorithm!r}", "setting", values, [field.name for field in fields(cls)])
+        return cls(**values)
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return all settings by name, as numbers and lists that TOML and JSON can hold; see `from_dict`."""
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
 
-def _is_a(kind: type, value: Any) -> bool:
-    """Tell whether a value may stand where one of this kind is expected: a whole number for any number, too."""
-    wider: dict[type, type] = {float: Real, int: Integral}
-    return isinstance(value, wider.get(kind, kind)) and isinstance(value, bool) == (kind is bool)
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Return the settings of `to_dict()`.
+
+        Raises:
+            InvalidOption: an unknown or a missing setting, or a value of the wrong type or out of its range.
+        """
+        check_names(f"agent {cls.algorithm!r}", "setting", values, [field.name for field in fields(cls)])
+        missing = [field.name for field in fields(cls) if field.name not in values]
+        if missing:
+            raise InvalidOption(f"agent {cls.algorithm!r}: the setting {missing[0]!r} is missing; expected all of "
+                                f"{', '.join(field.name for field in fields(cls))}")
+        return cls(**values)

@@ -1,19 +1,35 @@
-"""What every algorithm shares: S agents as one stack, their replay, the training loop, saving and loading."""
+"""What every algorithm shares: S agents as one stack, their replay, the training loop, saving and loading.
+
+An algorithm is a subclass with one method, `update`, which minimises a loss for each of its networks:
+
+    class Mine(StackedAgent):
+        settings_type = MySettings
+
+        def update(self, batch, critic_rate, actor_rate):
+            targets, critic = self.td_targets(batch), self.critic.weights
+            critic_loss = self.minimise(self.critic, critic_rate, my_loss, batch.obs_actions, targets)
+            actor_loss = self.minimise(self.actor, actor_rate, policy_loss, critic, batch.observations, self.box)
+            self.update_targets()
+            return {"critic_loss": critic_loss, "actor_loss": actor_loss}
+
+    def my_loss(critic, obs_actions, targets):                  # [S], differentiated by autograd
+        return huber_loss(critic(obs_actions), targets, reduction="none").mean(dim=(1, 2))
+"""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from pbcs_ompl.agents.networks import MLP
+from pbcs_ompl.agents.kernels.counter_rng import stream_keys
+from pbcs_ompl.agents.losses import ActionBox, td_targets
+from pbcs_ompl.agents.networks import MLP, Loss, TrainedNetwork, TrainedScalar, adam_rates
 from pbcs_ompl.agents.policy import Policy, to_box
-from pbcs_ompl.agents.replay import Replay
+from pbcs_ompl.agents.replay import Batch, Replay
 from pbcs_ompl.agents.settings import AgentSettings
-from pbcs_ompl.agents.streams import stream_keys
-from pbcs_ompl.agents.trained_network import TrainedNetwork, adam_rates
 from pbcs_ompl.agents.update import Compile, choose_device, compiled, quick_arithmetic
 from pbcs_ompl.core.errors import InvalidOption, Mismatch, PbcsError, UnsupportedSpace
 from pbcs_ompl.core.seeding import SeedTree
@@ -30,15 +46,23 @@ class NonFiniteData(PbcsError):
 class StackedAgent(ABC):
     """S independent agents of one algorithm, trained together; axis S comes first everywhere.
 
-    An algorithm is a subclass that says which networks there are, how one update is made, and what its critic
-    thinks. The network called "actor" gives the actions: its first A outputs, through a tanh, mapped onto the box.
-
     Args:
+        observation_size: Length O of an observation.
         action_low, action_high: The action box [A], finite.
         settings: An instance of `settings_type`; None for its defaults.
         seeds: One for each agent; a stack of S seeds does what S separate agents do.
         device: "cpu" or "cuda".
         compile: True, False, or "auto" (where it pays).
+
+    Attributes:
+        settings_type: The class of the settings.
+        gradients: Hand-written gradients of some losses, such as `kernels.gradients.GRADIENTS`; none for autograd.
+        outputs_per_action: Outputs of the actor for each action; its first A, through a tanh, are the action.
+        num_critics: Critics of each seed. They are one stack: the first ones of all seeds, then the second ones.
+        actor, critic: The networks.
+        replay: The replay buffers.
+        box: The action box, for losses.
+        stream_keys: Keys [S] of the random numbers of updates, for `kernels.counter_rng`.
 
     Raises:
         InvalidOption: an option out of its range.
@@ -46,6 +70,9 @@ class StackedAgent(ABC):
     """
 
     settings_type: ClassVar[type[AgentSettings]]
+    gradients: ClassVar[Mapping[Loss, Callable[..., Any]]] = {}
+    outputs_per_action: ClassVar[int] = 1
+    num_critics: ClassVar[int] = 1
 
     def __init__(self, observation_size: int, action_low: Any, action_high: Any, *,
                  settings: AgentSettings | None = None, seeds: Sequence[int] = (0,),
@@ -58,45 +85,117 @@ class StackedAgent(ABC):
         if not self.seeds or observation_size < 1:
             raise InvalidOption(f"{len(self.seeds)} seeds and {observation_size} observations, expected some")
         self.device = choose_device(device)
+        self.compile = compile
         self.num_updates = 0
-        self._compile = compile
-        self._half = self._tensor((self.action_high - self.action_low) / 2.0)
-        self._centre = self._tensor((self.action_high + self.action_low) / 2.0)
-        self._noise_keys = stream_keys(self.seeds, "updates")
+        self.box = ActionBox(self.tensor((self.action_high - self.action_low) / 2.0),
+                             self.tensor((self.action_high + self.action_low) / 2.0))
+        self.stream_keys = stream_keys(self.seeds, "updates")
         numbers = [SeedTree(seed).child("weights").integer() for seed in self.seeds]
-        self._networks = self._make_networks([torch.Generator().manual_seed(number) for number in numbers])
-        self._replay = Replay(observation_size, self.action_size, seeds=self.seeds,
-                              capacity=self.settings.replay_capacity, device=self.device)
-        self._run_update = compiled(self._update, compile, self.device)
+        self._trained = self.make_networks([torch.Generator().manual_seed(number) for number in numbers])
+        self.replay = Replay(observation_size, self.action_size, seeds=self.seeds,
+                             capacity=self.settings.replay_capacity, device=self.device)
+        self._run_update = compiled(self._update_rows, compile, self.device, record=not self.gradients)
+
+    def make_networks(self, generators: Sequence[torch.Generator]) -> dict[str, TrainedNetwork | TrainedScalar]:
+        """Return all that is trained, by name; an algorithm that trains more than actor and critic adds to it."""
+        hidden, norm = self.settings.hidden, self.settings.layer_norm
+        actor = MLP((self.observation_size, *hidden, self.outputs_per_action * self.action_size), norm)
+        critic = MLP((self.observation_size + self.action_size, *hidden, 1), norm)
+        self.actor = TrainedNetwork(actor, generators, self.device)
+        self.critic = TrainedNetwork(critic, list(generators) * self.num_critics, self.device)
+        return {"actor": self.actor, "critic": self.critic}
 
     @abstractmethod
-    def _make_networks(self, generators: Sequence[torch.Generator]) -> dict[str, TrainedNetwork]:
-        """Return the networks by name; one is called "actor"."""
+    def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor, /, *inputs: Any) -> dict[str, Tensor]:
+        """Make one update of all networks.
 
-    @abstractmethod
-    def _inputs(self, first: int, count: int) -> Iterable[tuple[Any, ...]]:
-        """Return what each of the updates number first, first + 1, ... (counted from 1) needs beside its mini-batch."""
+        Args:
+            batch: Mini-batches [S, B, ...].
+            critic_rate, actor_rate: Of this step of Adam, for `minimise`.
+            inputs: What else `update_inputs` returns.
 
-    @abstractmethod
-    def _update(self, *inputs: Any, **_: Any) -> dict[str, Tensor]:
-        """Make one update with mini-batches [S, B, W] and an item of `_inputs`; return the losses [S] by name."""
+        Returns:
+            The losses [S] by name.
+        """
 
-    @abstractmethod
+    def update_inputs(self, first: int, count: int) -> Iterable[tuple[Any, ...]]:
+        """Return the arguments of `update` after the mini-batch, for updates number first, first + 1, ... (from 1).
+
+        An algorithm that needs random numbers draws them here, for many updates at once.
+        """
+        return zip(*self.adam_rates(first, count), strict=True)
+
+    def adam_rates(self, first: int, count: int) -> tuple[Tensor, Tensor]:
+        """Return the rates of the critic's and the actor's steps number first, first + 1, ..., [count, 2] each."""
+        numbers = range(first, first + count)
+        return (self.rates_of(self.settings.critic_learning_rate, numbers),
+                self.rates_of(self.settings.actor_learning_rate, numbers))
+
+    def rates_of(self, learning_rate: float, numbers: Iterable[int]) -> Tensor:
+        """Return the rates [K, 2] of K steps of Adam by their numbers, counted from 1."""
+        return adam_rates(learning_rate, numbers, self.device)
+
+    def minimise(self, trained: TrainedNetwork | TrainedScalar, rate: Tensor, loss: Loss, *arguments: Any) -> Any:
+        """Make one step of Adam against the gradient of a loss.
+
+        The gradient comes from autograd, or from `gradients` if the loss is listed there.
+
+        Args:
+            trained: What is changed; the loss is given its weights (or values) first.
+            rate: Of this step; see `update`.
+            loss: Returns losses [S], or a tuple that begins with them.
+            arguments: Of the loss, after the weights.
+
+        Returns:
+            What the loss returned, without its graph.
+
+        Raises:
+            InvalidOption: the algorithm has hand-written gradients, but none for this loss.
+        """
+        by_hand = self.gradients.get(loss)
+        if by_hand is not None:
+            outcome = by_hand(trained, *arguments)
+        elif self.gradients:
+            raise InvalidOption(f"{type(self).__name__}.gradients has no gradient of the loss {loss.__name__!r}; "
+                                "set gradients = {} to leave all of them to autograd")
+        else:
+            outcome = trained.autograd(loss, *arguments)
+        trained.step(rate)
+        return outcome
+
+    def td_targets(self, batch: Batch) -> Tensor:
+        """Return y = r + discount Q'(s', pi'(s')) [S, B, 1], or r at the end of an episode: those of DDPG."""
+        squashed = self.actor.target(batch.next_observations).tanh_()
+        next_values = self.critic.target(self.box.join(batch.next_observations, squashed))
+        return td_targets(batch.rewards, batch.not_done, next_values, self.settings.discount)
+
+    def update_targets(self) -> None:
+        """Make a Polyak update of the target networks of actor and critic."""
+        self.actor.update_target(self.settings.polyak)
+        self.critic.update_target(self.settings.polyak)
+
     def value(self, observations: Array, actions: Array) -> Array:
-        """Return the critics' values [S, B] of actions [S, B, A] in observations [S, B, O]."""
+        """Return the first critics' values [S, B] of actions [S, B, A] in observations [S, B, O]."""
+        return self.critic_values(observations, actions)[: len(self.seeds)]
+
+    def critic_values(self, observations: Array, actions: Array) -> Array:
+        """Return the values [C S, B] of all C critics of each seed, the first ones of all seeds first."""
+        inputs = torch.cat((self.tensor(observations), self.tensor(actions)), dim=2)
+        with torch.inference_mode():
+            values = self.critic.weights(inputs.repeat(self.num_critics, 1, 1))
+            return values.squeeze(2).double().cpu().numpy()
 
     def act(self, observations: Array) -> Array:
         """Return the actors' actions [S, B, A] for observations [S, B, O], without noise."""
-        actor = self._networks["actor"]
         with torch.inference_mode():
-            outputs = actor.values(self._tensor(observations))[..., : self.action_size]
+            outputs = self.actor.weights(self.tensor(observations))[..., : self.action_size]
             return to_box(outputs.tanh().cpu().numpy(), self.action_low, self.action_high)
 
     def explore(self, observations: Array) -> Array:
-        """Return the actions [S, B, A] that the agent itself would try: those of `act`, or drawn from its policy."""
+        """Return the actions [S, B, A] of a stochastic policy; those of `act` where the policy is deterministic."""
         return self.act(observations)
 
-    def remember(self, observations: Array, actions: Array, rewards: Array, next_observations: Array,
+    def add_transitions(self, observations: Array, actions: Array, rewards: Array, next_observations: Array,
                  terminals: Array | BoolArray, mask: BoolArray | None = None) -> None:
         """Append transitions to the replay buffers.
 
@@ -104,8 +203,8 @@ class StackedAgent(ABC):
             observations, next_observations: [S, B, O].
             actions: [S, B, A].
             rewards: [S, B].
-            terminals: Whether nothing can be gained after the transition [S, B].
-            mask: Which transitions count [S, B], when seeds contribute different numbers; None for all.
+            terminals: Whether the episode ended with the transition, other than by a limit of steps [S, B].
+            mask: Which transitions are added [S, B], when seeds contribute different numbers; None for all.
 
         Raises:
             InvalidOption: arrays of the wrong shape.
@@ -124,16 +223,16 @@ class StackedAgent(ABC):
             if not np.isfinite(values if mask is None else values[mask]).all():
                 raise NonFiniteData(f"{name} hold NaN or infinity, after update {self.num_updates}")
         terminals = np.asarray(terminals, dtype=np.float64)
-        self._replay.add(observations, actions, rewards, next_observations, terminals, mask)
+        self.replay.add(observations, actions, rewards, next_observations, terminals, mask)
 
-    def forget(self) -> None:
+    def clear_replay(self) -> None:
         """Empty the replay buffers."""
-        self._replay.forget()
+        self.replay.clear()
 
     @property
     def replay_sizes(self) -> np.ndarray:
         """Number of transitions in each replay buffer [S]."""
-        return self._replay.sizes.copy()
+        return self.replay.sizes.copy()
 
     def train(self, num_updates: int) -> dict[str, np.ndarray]:
         """Make updates with mini-batches from the replay buffers; return the mean losses [S] by name.
@@ -142,21 +241,22 @@ class StackedAgent(ABC):
             InvalidOption: a replay buffer is empty.
             NonFiniteData: a loss is NaN or infinite; the message names the update.
         """
-        if num_updates > 0 and not self._replay.sizes.all():
-            seed = self.seeds[int(self._replay.sizes.argmin())]
-            raise InvalidOption(f"no transitions to learn from for seed {seed}; call remember first")
+        if num_updates > 0 and not self.replay.sizes.all():
+            seed = self.seeds[int(self.replay.sizes.argmin())]
+            raise InvalidOption(f"no transitions to learn from for seed {seed}; call add_transitions first")
         batch_size, seeds = self.settings.batch_size, len(self.seeds)
         chunk = max(1, CHUNK_ROWS // (batch_size * seeds))
         total: dict[str, np.ndarray] = {}
-        with quick_arithmetic(seeds * batch_size * max(self.settings.hidden) ** 2):
+        work = seeds * batch_size * max(self.settings.hidden) ** 2
+        with quick_arithmetic(work, record=not self.gradients):
             for start in range(0, num_updates, chunk):
                 for name, losses in self._train_chunk(min(chunk, num_updates - start)).items():
                     total[name] = total.get(name, 0.0) + losses.sum(axis=0)
         return {name: losses / num_updates for name, losses in total.items()}
 
     def _train_chunk(self, count: int) -> dict[str, np.ndarray]:
-        rows = self._replay.sample(count, self.settings.batch_size)
-        losses = self._run_updates(rows, self.num_updates + 1)
+        rows = self.replay.sample(count, self.settings.batch_size)
+        losses = self.run_updates(rows, self.num_updates + 1)
         for name, values in losses.items():
             if not np.isfinite(values).all():
                 update, seed = np.argwhere(~np.isfinite(values))[0]
@@ -166,32 +266,34 @@ class StackedAgent(ABC):
         self.num_updates += count
         return losses
 
-    def _run_updates(self, rows: Tensor, first: int) -> dict[str, np.ndarray]:
+    def run_updates(self, rows: Tensor, first: int) -> dict[str, np.ndarray]:
         """Make updates number first, first + 1, ... with rows [K, S, B, W]; return losses [K, S] by name."""
-        inputs = self._inputs(first, len(rows))
+        inputs = self.update_inputs(first, len(rows))
         steps = [self._run_update(batch, *more) for batch, more in zip(rows.unbind(), inputs, strict=True)]
         return {name: torch.stack([step[name] for step in steps]).double().cpu().numpy() for name in steps[0]}
 
+    def _update_rows(self, rows: Tensor, *inputs: Any) -> dict[str, Tensor]:
+        return self.update(self.replay.unpack(rows), *inputs)
+
     def policy(self, seed_index: int = 0) -> Policy:
         """Return a copy of one seed's actor that no longer changes."""
-        actor = self._networks["actor"]
-        layers = []
-        for weight, bias, norm in actor.network.split(actor.weights.flat.cpu().clone()):
-            vectors = [part[seed_index, 0] for part in (bias, *(norm or ()))]
-            layers.append(tuple(part.numpy().copy() for part in (weight[seed_index], *vectors)))
+        layers: list[tuple[np.ndarray, ...]] = []
+        for weight, *vectors in (layer.tensors() for layer in self.actor.weights.layers):
+            own = (weight[seed_index], *(vector[seed_index, 0] for vector in vectors))
+            layers.append(tuple(part.cpu().numpy().copy() for part in own))
         actions = self.action_size
         layers[-1] = tuple(np.ascontiguousarray(part[..., :actions]) for part in layers[-1])
         return Policy(tuple(layers), self.action_low.copy(), self.action_high.copy())
 
     def state_dict(self, indices: Sequence[int] | None = None) -> dict[str, np.ndarray]:
-        """Return everything that training needs to go on bit for bit, as named arrays.
+        """Return everything that training needs to continue bit for bit, as named arrays.
 
         Args:
             indices: Which agents of the stack; None for all.
         """
         chosen = range(len(self.seeds)) if indices is None else indices
-        state = {name: tensor.cpu().numpy() for name, tensor in self._part(chosen).items()}
-        state |= {f"replay/{name}": array for name, array in self._replay.state_dict(chosen).items()}
+        state = {name: tensor.cpu().numpy() for name, tensor in self.part(chosen).items()}
+        state |= {f"replay/{name}": array for name, array in self.replay.state_dict(chosen).items()}
         return state | {"num_updates": np.array(self.num_updates), "seeds": np.array(self.seeds)[list(chosen)]}
 
     def load_state_dict(self, state: Mapping[str, np.ndarray]) -> None:
@@ -200,9 +302,9 @@ class StackedAgent(ABC):
         Raises:
             Mismatch: the state is of another algorithm, other networks or other seeds.
         """
-        tensors = self._tensors()
+        tensors = self.tensors()
         replay = {key.removeprefix("replay/"): state[key] for key in state if key.startswith("replay/")}
-        if not {*tensors, "seeds", "num_updates"} <= set(state) or not self._replay.can_load(replay):
+        if not {*tensors, "seeds", "num_updates"} <= set(state) or not self.replay.can_load(replay):
             raise Mismatch("this is not the state of such an agent: networks or transitions are missing")
         if tuple(np.ravel(state["seeds"])) != self.seeds:
             raise Mismatch(f"state of the seeds {np.ravel(state['seeds'])}, expected {self.seeds}")
@@ -212,43 +314,30 @@ class StackedAgent(ABC):
                                "the state is of an agent with other settings")
         for name, tensor in tensors.items():
             tensor.copy_(torch.from_numpy(np.ascontiguousarray(state[name])))
-        self._replay.load_state_dict(replay)
+        self.replay.load_state_dict(replay)
         self.num_updates = int(state["num_updates"])
 
     def clone(self, indices: Sequence[int] | None = None) -> Self:
-        """Return an independent copy of the stack, or of some of its agents, that goes on as they would have."""
+        """Return an independent copy of the stack, or of some of its agents, that trains as they would have."""
         seeds = self.seeds if indices is None else [self.seeds[index] for index in indices]
         copy = type(self)(self.observation_size, self.action_low, self.action_high, settings=self.settings,
-                          seeds=seeds, device=self.device, compile=self._compile)
+                          seeds=seeds, device=self.device, compile=self.compile)
         copy.load_state_dict(self.state_dict(indices))
         return copy
 
-    def _tensors(self) -> dict[str, Tensor]:
-        return {f"{name}/{part}": tensor for name, network in self._networks.items()
-                for part, tensor in network.tensors().items()}
+    def tensors(self) -> dict[str, Tensor]:
+        """Return all that is saved of the networks, by name."""
+        return {f"{name}/{part}": tensor for name, trained in self._trained.items()
+                for part, tensor in trained.tensors().items()}
 
-    def _part(self, seeds: Sequence[int]) -> dict[str, Tensor]:
-        """Return copies of `_tensors()` for some seeds, by their places."""
-        return {f"{name}/{part}": tensor for name, network in self._networks.items()
-                for part, tensor in network.part(seeds, len(self.seeds)).items()}
+    def part(self, seeds: Sequence[int]) -> dict[str, Tensor]:
+        """Return copies of `tensors()` for some seeds, by their indices."""
+        return {f"{name}/{part}": tensor for name, trained in self._trained.items()
+                for part, tensor in trained.part(seeds, len(self.seeds)).items()}
 
-    def _network(self, inputs: int, outputs: int, generators: Sequence[torch.Generator]) -> TrainedNetwork:
-        network = MLP((inputs, *self.settings.hidden, outputs), self.settings.layer_norm)
-        return TrainedNetwork(network, generators, self.device)
-
-    def _adam_rates(self, learning_rate: float, numbers: Iterable[int]) -> tuple[Tensor, ...]:
-        return adam_rates(learning_rate, numbers, self.device).unbind()
-
-    def _on_box(self, unit: Tensor) -> Tensor:
-        """Map values in [-1, 1] onto the action box."""
-        return torch.addcmul(self._centre, unit, self._half)
-
-    def _tensor(self, values: Array) -> Tensor:
+    def tensor(self, values: Array) -> Tensor:
+        """Return an array as float32 on the agent's device."""
         return torch.from_numpy(np.asarray(values, dtype=np.float32)).to(self.device)
-
-    def _pairs(self, observations: Array, actions: Array) -> Tensor:
-        """Return what a critic is given, [S, B, O + A]."""
-        return torch.cat((self._tensor(observations), self._tensor(actions)), dim=2)
 
 
 def _action_box(low: Any, high: Any) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""How an update is run: as it is, or compiled; on how many threads; with which treatment of tiny numbers."""
+"""How an update runs: eager or compiled, on which device, on how many threads, with denormal numbers or without."""
 
 import warnings
 from collections.abc import Callable, Iterator
@@ -19,23 +19,30 @@ def choose_device(name: str | torch.device) -> torch.device:
     """Return the device.
 
     Raises:
-        InvalidOption: the device does not exist, or is not there.
+        InvalidOption: the device does not exist, or is not available.
     """
     try:
         device = torch.device(name)
     except RuntimeError as error:
         raise InvalidOption(f"unknown device {name!r}; choose 'cpu' or 'cuda'") from error
     if device.type == "cuda" and not torch.cuda.is_available():
-        raise InvalidOption(f"device {str(name)!r} was asked for, but torch sees no CUDA device; use 'cpu'")
+        raise InvalidOption(f"device is {str(name)!r}, but torch sees no CUDA device; use 'cpu'")
     return device
 
 
-def compiled(function: Callable[..., Any], compile: Compile, device: torch.device) -> Callable[..., Any]:
+def compiled(function: Callable[..., Any], compile: Compile, device: torch.device, *,
+             record: bool) -> Callable[..., Any]:
     """Return `function`, compiled by torch when asked for; "auto" does so on CUDA only.
 
     On a CPU the hand-written gradients leave torch's compiler 5 to 20 %, for which it would take 5 to 40 s;
-    there an algorithm may bring a kernel, which is faster than both. When compilation fails, the function
-    goes on as it is, with one warning.
+    there an algorithm may have a kernel, which is faster than both. When compilation fails, the function
+    runs uncompiled, with one warning.
+
+    Args:
+        function: What is compiled.
+        compile: True, False or "auto".
+        device: Where it will run.
+        record: Whether autograd records losses in it.
 
     Raises:
         InvalidOption: `compile` is none of True, False, "auto".
@@ -44,7 +51,7 @@ def compiled(function: Callable[..., Any], compile: Compile, device: torch.devic
         raise InvalidOption(f"compile is {compile!r}, expected True, False or 'auto'")
     if compile is False or (compile == "auto" and device.type == "cpu"):
         return function
-    return _CompiledOrNot(function)
+    return _CompiledOrNot(function, record)
 
 
 class _CompiledOrNot:
@@ -53,9 +60,10 @@ class _CompiledOrNot:
     A compilation fails before anything has run, so nothing is done twice.
     """
 
-    def __init__(self, function: Callable[..., Any]):
+    def __init__(self, function: Callable[..., Any], record: bool):
         self._plain = function
-        self._chosen: Callable[..., Any] = torch.compile(function, fullgraph=True, dynamic=False)
+        chosen: Callable[..., Any] = torch.compile(function, fullgraph=True, dynamic=False)
+        self._chosen = _trace_autograd(chosen) if record else chosen
 
     def __call__(self, *arguments: Any) -> Any:
         try:
@@ -64,10 +72,18 @@ class _CompiledOrNot:
             if self._chosen is self._plain:
                 raise
             reason = str(error).strip().partition("\n")[0]
-            message = f"torch.compile failed, going on without it: {reason}"
+            message = f"torch.compile failed, running uncompiled: {reason}"
             warnings.warn(message, RuntimeWarning, stacklevel=2)
             self._chosen = self._plain
             return self._plain(*arguments)
+
+
+def _trace_autograd(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Let torch's compiler trace the gradients of losses; versions that cannot do it refuse to compile them."""
+    if "trace_autograd_ops" not in torch._dynamo.config.get_config_copy():
+        return function
+    traced: Callable[..., Any] = torch._dynamo.config.patch(trace_autograd_ops=True)(function)
+    return traced
 
 
 @contextmanager
@@ -82,10 +98,14 @@ def one_thread() -> Iterator[None]:
 
 
 @contextmanager
-def quick_arithmetic(work: int) -> Iterator[None]:
+def quick_arithmetic(work: int, *, record: bool) -> Iterator[None]:
     """Run small products on one thread, and round denormal numbers to zero.
 
-    Adam's moments of units that are never active decay for ever; as denormal numbers they would slow it all.
+    Adam's moments of units that are never active decay for ever; as denormal numbers they would slow all updates.
+
+    Args:
+        work: Multiplications in the largest matrix product.
+        record: Whether autograd will record losses. If not, torch's inference mode saves a tenth of the time.
     """
     threads = torch.get_num_threads()
     flushed_before = float(np.float32(1e-40) * np.float32(0.5)) == 0.0
@@ -93,7 +113,7 @@ def quick_arithmetic(work: int) -> Iterator[None]:
         torch.set_num_threads(1)
     torch.set_flush_denormal(True)
     try:
-        with torch.inference_mode():
+        with torch.no_grad() if record else torch.inference_mode():
             yield
     finally:
         torch.set_flush_denormal(flushed_before)

@@ -52,7 +52,7 @@ class Learner:
     def begin(self, goal_index: int, goal: Goal | None = None) -> None:
         """Start a new skill that ends at `goal_index`: no replay and, without `warm_start`, new networks."""
         self.aim(goal_index, goal)
-        self.agent.forget()
+        self.agent.clear_replay()
         if not self.settings.warm_start and self.agent.num_updates:
             self.restart()
 
@@ -152,7 +152,7 @@ class Learner:
     def _remember(self, episodes: Episodes) -> None:
         before, after = (self.frame(self.model.observe(states))
                          for states in (episodes.states, episodes.next_states))
-        self.agent.remember(before[None], episodes.controls[None], episodes.rewards[None], after[None],
+        self.agent.add_transitions(before[None], episodes.controls[None], episodes.rewards[None], after[None],
                             episodes.terminals[None])
 
     def _train(self, transitions: int) -> None:

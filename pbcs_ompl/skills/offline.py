@@ -44,7 +44,7 @@ class Bootstrapped(OneSkill):
         found = explore(learner.model, count, int(learner.rng.integers(2**31)))
         learner.counter.count += len(found.rewards)
         before, after = (learner.frame(learner.model.observe(states)) for states in (found.states, found.next_states))
-        learner.agent.remember(before[None], found.controls[None], found.rewards[None], after[None],
+        learner.agent.add_transitions(before[None], found.controls[None], found.rewards[None], after[None],
                                found.terminals[None])
 
     def _train(self) -> None:

@@ -1,13 +1,16 @@
-"""Presets, settings out of range, devices that are not there."""
+"""Presets, settings out of range, unavailable devices."""
 
+import json
 import subprocess
 import sys
+from dataclasses import fields
+from importlib.resources import files
 
 import numpy as np
 import pytest
 import torch
 
-from pbcs_ompl.agents import DDPG, DDPGSettings, preset_names
+from pbcs_ompl.agents import DDPG, DDPGSettings, SACSettings, TD3Settings, preset_names, preset_version
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, UnsupportedSpace
 
 
@@ -20,7 +23,42 @@ def test_presets_hold_what_the_sources_say() -> None:
     assert DDPGSettings.from_preset("thesis", discount=0.9).discount == 0.9
 
 
-def test_wrong_names_are_answered_with_the_closest() -> None:
+def test_every_preset_has_a_version_and_a_source_for_every_value() -> None:
+    for name in preset_names():
+        assert preset_version(name) >= 1
+        lines = files("pbcs_ompl.agents").joinpath(f"{name}.toml").read_text().splitlines()
+        values = [line for line in lines if "=" in line and not line.startswith(("#", "version"))]
+        assert values
+        assert all(" # " in line for line in values)
+    with pytest.raises(UnknownName, match="'thesis'"):
+        preset_version("thesys")
+
+
+@pytest.mark.parametrize("kind", [DDPGSettings, TD3Settings, SACSettings])
+def test_settings_survive_json_and_are_rebuilt_from_all_of_their_values(kind) -> None:
+    settings = kind.from_preset("thesis", hidden=[7, 9], discount=0.5)
+    values = json.loads(json.dumps(settings.to_dict()))
+    assert kind.from_dict(values) == settings
+    assert list(values) == [field.name for field in fields(kind)]
+    for name in values:
+        with pytest.raises(InvalidOption, match=name):
+            kind.from_dict({other: value for other, value in values.items() if other != name})
+        with pytest.raises(InvalidOption, match=name):
+            kind.from_dict(values | {name: "much"})
+    with pytest.raises(InvalidOption, match="'polyak'"):
+        kind.from_dict(values | {"poliak": 0.5})
+
+
+def test_an_algorithm_that_a_preset_does_not_know_gets_its_common_values() -> None:
+    class Unknown(DDPGSettings):
+        algorithm = "nobody"
+
+    assert Unknown.from_preset("thesis").hidden == (400, 300)
+    with pytest.raises(InvalidOption, match="no settings for 'nobody'"):
+        Unknown.from_preset("thesis-chapter-4")
+
+
+def test_errors_name_the_closest_name() -> None:
     with pytest.raises(UnknownName, match="'thesis'"):
         DDPGSettings.from_preset("thesys")
     with pytest.raises(InvalidOption, match="'discount'"):

@@ -1,10 +1,11 @@
-"""DDPG: its losses by hand, every way of running it, saving, and learning; see tests/contracts/ for the rest."""
+"""DDPG: its losses from their equations, every way of running it, saving, learning; see tests/contracts/ for the rest."""
 
 import numpy as np
 import pytest
 import torch
 
 from pbcs_ompl.agents import DDPG, DDPGSettings, NonFiniteData
+from pbcs_ompl.agents.networks import TrainedNetwork
 from pbcs_ompl.agents.update import Compile
 
 SMALL = DDPGSettings(hidden=(24, 20), batch_size=32)
@@ -22,22 +23,21 @@ def data(seed: int, count: int = 200) -> list[np.ndarray]:
 
 
 def fill(agent: DDPG, *seeds: int) -> DDPG:
-    agent.remember(*(np.stack(field) for field in zip(*(data(seed) for seed in seeds), strict=True)))
+    agent.add_transitions(*(np.stack(field) for field in zip(*(data(seed) for seed in seeds), strict=True)))
     return agent
 
 
 def weights(agent: DDPG, seed_index: int) -> np.ndarray:
     """All of one seed's parameters, targets and moments in a row."""
-    parts = []
-    for net in agent._networks.values():
-        for flat in net.tensors().values():
-            for layer in net.network.split(flat):
-                norm = () if layer.norm is None else layer.norm
-                parts += [part[seed_index].ravel() for part in (layer.weight, layer.bias, *norm)]
-    return torch.cat(parts).numpy()
+    state = agent.state_dict([seed_index])
+    return np.concatenate([state[name] for name in sorted(state) if name.startswith(("actor/", "critic/"))])
 
 
-def run_numpy(layers: tuple, inputs: np.ndarray) -> np.ndarray:
+def numpy_layers(network: TrainedNetwork) -> list[tuple[np.ndarray, np.ndarray]]:
+    return [(layer.weight[0].double().numpy(), layer.bias[0, 0].double().numpy()) for layer in network.weights.layers]
+
+
+def run_numpy(layers: list, inputs: np.ndarray) -> np.ndarray:
     for weight, bias in layers[:-1]:
         inputs = np.maximum(inputs @ weight + bias, 0.0)
     return inputs @ layers[-1][0] + layers[-1][1]
@@ -47,52 +47,21 @@ def run_numpy(layers: tuple, inputs: np.ndarray) -> np.ndarray:
 def test_first_losses_equal_the_equations_row_by_row(compile: Compile) -> None:
     """Eqs. 1.2 and 1.3 of [Matheron2020], in float64; targets equal the networks before the first update."""
     agent = fill(make(3, compile=compile), 0)
-    rows = agent.clone()._replay.sample(1, SMALL.batch_size)[0, 0].double().numpy()
-    actor, critic = ([(layer.weight[0].double().numpy(), layer.bias[0, 0].double().numpy())
-                      for layer in net.weights.layers] for net in agent._networks.values())
+    rows = agent.clone().replay.sample(1, SMALL.batch_size)[0, 0].double().numpy()
+    actor, critic = numpy_layers(agent.actor), numpy_layers(agent.critic)
     half, centre = (np.array(HIGH) - LOW) / 2, (np.array(HIGH) + LOW) / 2
     errors = []
     for row in rows:
-        state, action, reward, goes_on, following = row[:3], row[3:5], row[5], row[6], row[7:]
-        next_action = centre + half * np.tanh(run_numpy(actor, following))
-        target = reward + SMALL.discount * goes_on * run_numpy(critic, np.r_[following, next_action])[0]
+        state, action, reward, not_done, next_state = row[:3], row[3:5], row[5], row[6], row[7:]
+        next_action = centre + half * np.tanh(run_numpy(actor, next_state))
+        target = reward + SMALL.discount * not_done * run_numpy(critic, np.r_[next_state, next_action])[0]
         errors.append(run_numpy(critic, np.r_[state, action])[0] - target)
     losses = agent.train(1)
     np.testing.assert_allclose(losses["critic_loss"], np.mean(np.square(errors)), rtol=1e-5)
-    updated = [(layer.weight[0].double().numpy(), layer.bias[0, 0].double().numpy())
-               for layer in agent._networks["critic"].weights.layers]
+    updated = numpy_layers(agent.critic)
     values = [run_numpy(updated, np.r_[row[:3], centre + half * np.tanh(run_numpy(actor, row[:3]))])[0]
               for row in rows]
     np.testing.assert_allclose(losses["actor_loss"], -np.mean(values), rtol=1e-4)
-
-
-def test_first_gradients_equal_autograd() -> None:
-    agent = fill(make(3, 4, compile=False), 0, 1)
-    rows = agent._replay.sample(1, SMALL.batch_size)[0]
-    agent._critic_gradient(rows)
-    agent._actor_gradient(rows)
-    batch, nets = agent._replay.unpack(rows), agent._networks
-    leaves = {name: net.weights.flat.clone().requires_grad_() for name, net in nets.items()}
-
-    def run(name: str, flat: torch.Tensor, inputs: torch.Tensor) -> torch.Tensor:
-        *hidden, last = nets[name].network.split(flat)
-        for layer in hidden:
-            inputs = torch.relu(inputs @ layer.weight + layer.bias)
-        return inputs @ last.weight + last.bias
-
-    def act(flat: torch.Tensor, observations: torch.Tensor) -> torch.Tensor:
-        return agent._centre + agent._half * torch.tanh(run("actor", flat, observations))
-
-    after = batch.next_observations
-    next_pairs = torch.cat((after, act(nets["actor"].target.flat, after)), 2)
-    following = run("critic", nets["critic"].target.flat, next_pairs)
-    target = batch.rewards + SMALL.discount * batch.continues * following
-    critic_loss = (run("critic", leaves["critic"], batch.pairs) - target).square().mean((1, 2)).sum()
-    pairs = torch.cat((batch.observations, act(leaves["actor"], batch.observations)), 2)
-    actor_loss = -run("critic", nets["critic"].weights.flat, pairs).mean((1, 2)).sum()
-    for name, loss in (("critic", critic_loss), ("actor", actor_loss)):
-        expected = torch.autograd.grad(loss, leaves[name])[0]
-        torch.testing.assert_close(nets[name].gradient.flat, expected, rtol=1e-4, atol=1e-6)
 
 
 @pytest.mark.parametrize("compile", ["auto", False])
@@ -126,13 +95,13 @@ def test_torch_compile_equals_eager_torch(layer_norm: bool) -> None:
     np.testing.assert_allclose(weights(compiled, 1), weights(eager, 1), atol=1e-5)
 
 
-def test_a_failed_compilation_goes_on_eagerly_with_one_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_compilation_continues_eagerly_with_one_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object, **__: object) -> None:
         raise torch._dynamo.exc.BackendCompilerFailed(fail, RuntimeError("no compiler"), None)
 
     monkeypatch.setattr(torch, "compile", lambda function, **_: fail)
     agent, eager = fill(make(1, compile=True), 3), fill(make(1, compile=False), 3)
-    with pytest.warns(RuntimeWarning, match="going on without it") as caught:
+    with pytest.warns(RuntimeWarning, match="running uncompiled") as caught:
         agent.train(5)
     assert len(caught) == 1
     eager.train(5)
@@ -140,7 +109,7 @@ def test_a_failed_compilation_goes_on_eagerly_with_one_warning(monkeypatch: pyte
 
 
 @pytest.mark.parametrize("compile", ["auto", False])
-def test_saved_and_loaded_agents_go_on_bit_for_bit(compile: Compile) -> None:
+def test_saved_and_loaded_agents_continue_bit_for_bit(compile: Compile) -> None:
     first = fill(make(1, 2, compile=compile), 3, 4)
     first.train(30)
     second = make(1, 2, compile=compile)
@@ -158,9 +127,8 @@ def test_saved_and_loaded_agents_go_on_bit_for_bit(compile: Compile) -> None:
 
 def test_actions_stay_in_an_asymmetric_box_and_reach_its_corners() -> None:
     agent = make(1, 2)
-    actor = agent._networks["actor"]
     for sign, corner in ((1.0, HIGH), (-1.0, LOW)):
-        actor.weights.layers[-1].bias.fill_(40.0 * sign)
+        agent.actor.weights.layers[-1].bias.fill_(40.0 * sign)
         observations = np.random.default_rng(0).normal(size=(2, 30, 3))
         actions = agent.act(observations)
         assert actions.dtype == np.float64
@@ -174,7 +142,7 @@ def test_actions_stay_in_an_asymmetric_box_and_reach_its_corners() -> None:
 def test_a_nan_in_a_loss_names_seed_and_update(compile: Compile) -> None:
     agent = fill(make(8, 9, compile=compile), 0, 1)
     agent.train(3)
-    agent._networks["critic"].weights.layers[0].weight[1, 0, 0] = float("nan")
+    agent.critic.weights.layers[0].weight[1, 0, 0] = float("nan")
     with pytest.raises(NonFiniteData, match="critic_loss of seed 9 is nan in update 4"):
         agent.train(10)
 
@@ -185,8 +153,8 @@ def test_it_learns_to_reach_a_point_on_a_line() -> None:
     rng = np.random.default_rng(1)
     before, actions = rng.uniform(-1, 1, (2, 3000, 1)), rng.uniform(-0.2, 0.2, (2, 3000, 1))
     after = np.clip(before + actions, -1, 1)
-    arrived = np.abs(after[..., 0]) < 0.1
-    agent.remember(before, actions, np.where(arrived, 0.0, -1.0), after, arrived)
+    success = np.abs(after[..., 0]) < 0.1
+    agent.add_transitions(before, actions, np.where(success, 0.0, -1.0), after, success)
     agent.train(4000)
     places = np.linspace(-1, 1, 21)[None, :, None].repeat(2, axis=0)
     done = np.abs(places[..., 0]) < 0.1

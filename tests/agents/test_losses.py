@@ -1,260 +1,260 @@
-"""The losses of TD3, SAC, DDPG-argmax and the regression: row by row in NumPy, their gradients by torch.autograd.
-
-Both look at one update of a stack of two agents that have learnt for a while, so that targets lag behind.
-"""
-
-from types import SimpleNamespace
+"""The losses: row by row in NumPy from their equations, and the hand-written gradients against autograd."""
 
 import numpy as np
 import pytest
 import torch
 
-from pbcs_ompl.agents import SAC, TD3, DDPGArgmax, DDPGRegression, StackedAgent
+from pbcs_ompl.agents import SAC, TD3, DDPGArgmax, StackedAgent, losses
+from pbcs_ompl.agents.ddpg_argmax import best_candidates
+from pbcs_ompl.agents.kernels.gradients import GRADIENTS
+from pbcs_ompl.agents.losses import ActionBox
+from pbcs_ompl.agents.networks import MLP, TrainedNetwork, TrainedScalar
+from pbcs_ompl.agents.replay import Batch
 
 LOW, HIGH = np.array([-1.0, 0.0]), np.array([0.5, 10.0])
 HALF, CENTRE = (HIGH - LOW) / 2, (HIGH + LOW) / 2
+BOX = ActionBox(torch.tensor(HALF).float(), torch.tensor(CENTRE).float())
 DISCOUNT, BATCH, SEEDS = 0.9, 32, 2
-KINDS = {TD3: {"policy_delay": 1}, SAC: {"temperature": 0.3}, DDPGArgmax: {"candidates": 9}, DDPGRegression: {}}
+CPU = torch.device("cpu")
 
 
-def trained(kind: type[StackedAgent]) -> StackedAgent:
-    settings = kind.settings_type(hidden=(16, 12), batch_size=BATCH, discount=DISCOUNT, polyak=0.9, **KINDS[kind])
-    agent = kind(3, LOW, HIGH, settings=settings, seeds=(3, 4), compile=False)
+def network(outputs: int, *seeds: int, inputs: int = 3, layer_norm: bool = False) -> TrainedNetwork:
+    generators = [torch.Generator().manual_seed(seed) for seed in seeds]
+    return TrainedNetwork(MLP((inputs, 16, 12, outputs), layer_norm), generators, CPU)
+
+
+def randn(*shape: int, seed: int = 0) -> torch.Tensor:
+    return torch.randn(*shape, generator=torch.Generator().manual_seed(seed))
+
+
+def arguments(loss: object, layer_norm: bool) -> tuple:
+    """What the loss is given: first what is trained, then the rest."""
+    actor, critic = network(2, 1, 2, layer_norm=layer_norm), network(1, 3, 4, inputs=5, layer_norm=layer_norm)
+    observations = randn(SEEDS, BATCH, 3)
+    squashed, targets = randn(SEEDS, BATCH, 2, seed=1).tanh(), randn(SEEDS, BATCH, 1, seed=2)
+    obs_actions = BOX.join(observations, squashed)
+    if loss is losses.critic_loss:
+        return critic, obs_actions, targets
+    if loss is losses.policy_loss:
+        return actor, critic.weights, observations, BOX
+    if loss is losses.imitation_loss:
+        return actor, observations, squashed
+    if loss is losses.improvement_loss:
+        return actor, critic.weights, obs_actions, targets, BOX
+    if loss is losses.soft_policy_loss:
+        actor = network(4, 1, 2, layer_norm=layer_norm)
+        critics = network(1, 3, 4, 5, 6, inputs=5, layer_norm=layer_norm)
+        noise = randn(SEEDS, BATCH, 2, seed=3)
+        return actor, critics.weights, observations, noise, torch.tensor([0.3, 0.1]), BOX
+    assert loss is losses.temperature_loss
+    return TrainedScalar(torch.tensor([-1.0, 0.5]), CPU), randn(SEEDS, BATCH, 1), -2.0
+
+
+def flat_gradient(trained: TrainedNetwork | TrainedScalar) -> torch.Tensor:
+    return (trained.gradient if isinstance(trained, TrainedScalar) else trained.gradient.flat).clone()
+
+
+@pytest.mark.parametrize("layer_norm", [False, True])
+@pytest.mark.parametrize("loss", GRADIENTS, ids=lambda loss: loss.__name__)
+def test_hand_written_gradients_equal_autograd(loss, layer_norm: bool) -> None:
+    trained, *rest = arguments(loss, layer_norm)
+    expected, gradient = trained.autograd(loss, *rest), flat_gradient(trained)
+    outcome, by_hand = GRADIENTS[loss](trained, *rest), flat_gradient(trained)
+    torch.testing.assert_close(outcome, expected, rtol=1e-6, atol=1e-6)
+    torch.testing.assert_close(by_hand, gradient, rtol=1e-5, atol=1e-6)
+    assert gradient.abs().max() > 0.0
+
+
+@pytest.mark.parametrize("loss", GRADIENTS, ids=lambda loss: loss.__name__)
+def test_autograd_equals_difference_quotients(loss) -> None:
+    """In float32 only two digits of a quotient are sure: it is taken along the gradient itself, where it is largest."""
+    trained, *rest = arguments(loss, layer_norm=False)
+    trained.autograd(loss, *rest)
+    gradient = flat_gradient(trained)
+    values = trained.values if isinstance(trained, TrainedScalar) else trained.weights.flat
+    step = 1e-3 * gradient / gradient.norm()
+    total = []
+    for sign in (1.0, -1.0):
+        values.add_(sign * step)
+        outcome = loss(trained.values if isinstance(trained, TrainedScalar) else trained.weights, *rest)
+        total.append(float((outcome[0] if isinstance(outcome, tuple) else outcome).double().sum()))
+        values.sub_(sign * step)
+    assert (total[0] - total[1]) / 2e-3 == pytest.approx(float(gradient.norm()), rel=0.05)
+
+
+def numpy_network(trained: TrainedNetwork, index: int, target: bool = False):
+    """One network of a stack as a function of a vector, in float64."""
+    layers = [(layer.weight[index].double().numpy(), layer.bias[index, 0].double().numpy())
+              for layer in (trained.target if target else trained.weights).layers]
+
+    def run(inputs: np.ndarray) -> np.ndarray:
+        for weight, bias in layers[:-1]:
+            inputs = np.maximum(inputs @ weight + bias, 0.0)
+        return inputs @ layers[-1][0] + layers[-1][1]
+
+    return run
+
+
+def q(critic, state: np.ndarray, squashed: np.ndarray) -> float:
+    return float(critic(np.r_[state, CENTRE + HALF * squashed])[0])
+
+
+def draw(actor, state: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, float]:
+    """SAC's squashed action and the logarithm of its density."""
+    mean, log_std = np.split(actor(state), 2)
+    inner = mean + np.exp(log_std) * noise
+    normal = np.exp(-0.5 * noise**2) / (np.exp(log_std) * np.sqrt(2 * np.pi))
+    return np.tanh(inner), np.log(np.prod(normal / (1 - np.tanh(inner) ** 2)))
+
+
+def row_losses(loss: object, trained, rest: list, seed: int) -> list[float]:
+    """The loss of each item of one seed's mini-batch."""
+    double = [part[seed].double().numpy() if isinstance(part, torch.Tensor) and part.ndim == 3 else part
+              for part in rest]
+    if loss is losses.temperature_loss:
+        return [-float(trained.values[seed]) * (float(density[0]) + rest[1]) for density in double[0]]
+    own = numpy_network(trained, seed)
+    if loss is losses.critic_loss:
+        return [float((own(pair)[0] - y[0]) ** 2) for pair, y in zip(*double, strict=True)]
+    if loss is losses.imitation_loss:
+        return [float(np.sum((np.tanh(own(state)) - c) ** 2)) for state, c in zip(*double, strict=True)]
+    weights, count = rest[0], rest[0].layers[0].weight.shape[0] // SEEDS
+    critics = []
+    for index in range(seed, count * SEEDS, SEEDS):
+        stand_in = TrainedNetwork(weights.network, [torch.Generator()] * count * SEEDS, CPU)
+        stand_in.weights.flat.copy_(weights.flat)
+        critics.append(numpy_network(stand_in, index))
+    if loss is losses.policy_loss:
+        return [-q(critics[0], state, np.tanh(own(state))) for state in double[1]]
+    if loss is losses.improvement_loss:
+        better = [float(y[0]) > q(critics[0], pair[:3], np.tanh(own(pair[:3])))
+                  for pair, y in zip(double[1], double[2], strict=True)]
+        assert 0 < sum(better) < BATCH
+        return [float(one * np.sum((np.tanh(own(pair[:3])) - (pair[3:] - CENTRE) / HALF) ** 2))
+                for one, pair in zip(better, double[1], strict=True)]
+    drawn = [draw(own, state, noise) for state, noise in zip(double[1], double[2], strict=True)]
+    return [float(rest[3][seed]) * density - min(q(critic, state, squashed) for critic in critics)
+            for state, (squashed, density) in zip(double[1], drawn, strict=True)]
+
+
+@pytest.mark.parametrize("loss", GRADIENTS, ids=lambda loss: loss.__name__)
+def test_losses_equal_their_equations_row_by_row(loss) -> None:
+    trained, *rest = arguments(loss, layer_norm=False)
+    outcome = loss(trained.values if isinstance(trained, TrainedScalar) else trained.weights, *rest)
+    values = outcome[0] if isinstance(outcome, tuple) else outcome
+    for seed in range(SEEDS):
+        assert float(values[seed]) == pytest.approx(np.mean(row_losses(loss, trained, rest, seed)), rel=1e-4, abs=1e-5)
+
+
+def trained_agent(kind: type[StackedAgent], **settings: object) -> StackedAgent:
+    """A stack that has learnt for a while, so that targets differ from the networks."""
+    chosen = kind.settings_type(hidden=(16, 12), batch_size=BATCH, discount=DISCOUNT, polyak=0.9, **settings)
+    agent = kind(3, LOW, HIGH, settings=chosen, seeds=(3, 4), compile=False)
     rng = np.random.default_rng(0)
-    agent.remember(rng.normal(size=(SEEDS, 200, 3)), rng.uniform(LOW, HIGH, (SEEDS, 200, 2)),
-                   rng.normal(size=(SEEDS, 200)), rng.normal(size=(SEEDS, 200, 3)), rng.random((SEEDS, 200)) < 0.2)
+    agent.add_transitions(rng.normal(size=(SEEDS, 200, 3)), rng.uniform(LOW, HIGH, (SEEDS, 200, 2)),
+                          rng.normal(size=(SEEDS, 200)), rng.normal(size=(SEEDS, 200, 3)),
+                          rng.random((SEEDS, 200)) < 0.2)
     agent.train(20)
     return agent
 
 
-def observed(kind: type[StackedAgent]) -> SimpleNamespace:
-    """One update: what went in, the weights before and after it, the losses, and the gradients it left."""
-    agent = trained(kind)
-    rows = agent._replay.sample(1, BATCH)[0]
-    (inputs,) = agent._inputs(agent.num_updates + 1, 1)
-    seen = SimpleNamespace(agent=agent, rows=rows, noise=inputs[-1] if inputs[-1] is not True else inputs[-2])
-    seen.old = {name: net.weights.flat.clone() for name, net in agent._networks.items()}
-    seen.target = {name: net.target.flat.clone() for name, net in agent._networks.items()}
-    seen.temperature = agent._log_temperature.values.exp() if kind is SAC else None
-    seen.losses = agent._update(rows, *inputs)
-    seen.new = {name: net.weights.flat.clone() for name, net in agent._networks.items()}
-    return seen
+def batch_of(agent: StackedAgent) -> Batch:
+    return agent.replay.unpack(agent.replay.sample(1, BATCH)[0])
 
 
-def numpy_layers(seen: SimpleNamespace, flat: torch.Tensor, name: str, index: int) -> list[tuple]:
-    return [(layer.weight[index].double().numpy(), layer.bias[index, 0].double().numpy())
-            for layer in seen.agent._networks[name].network.split(flat)]
-
-
-def run_numpy(layers: list[tuple], inputs: np.ndarray) -> np.ndarray:
-    for weight, bias in layers[:-1]:
-        inputs = np.maximum(inputs @ weight + bias, 0.0)
-    return inputs @ layers[-1][0] + layers[-1][1]
-
-
-def split(row: np.ndarray) -> tuple:
-    """State, action, reward, whether it goes on, next state."""
-    return row[:3], row[3:5], row[5], row[6], row[7:]
-
-
-def q(critic: list[tuple], state: np.ndarray, unit: np.ndarray) -> float:
-    return run_numpy(critic, np.r_[state, CENTRE + HALF * unit])[0]
-
-
-def draw(actor: list[tuple], state: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, float]:
-    """SAC's action in the unit box, and the logarithm of its density."""
-    mean, log_deviation = np.split(run_numpy(actor, state), 2)
-    inner = mean + np.exp(log_deviation) * noise
-    normal = np.exp(-0.5 * noise**2) / (np.exp(log_deviation) * np.sqrt(2 * np.pi))
-    return np.tanh(inner), np.log(np.prod(normal / (1 - np.tanh(inner) ** 2)))
-
-
-def td3_rows(seen: SimpleNamespace, seed: int, rows: np.ndarray, noise: np.ndarray) -> tuple[float, float]:
-    actor, target_actor = (numpy_layers(seen, flat["actor"], "actor", seed) for flat in (seen.old, seen.target))
-    twins, target_twins = ([numpy_layers(seen, flat["critics"], "critics", index) for index in (seed, seed + SEEDS)]
-                           for flat in (seen.old, seen.target))
-    first = numpy_layers(seen, seen.new["critics"], "critics", seed)
-    errors, values = [], []
-    for row, disturbance in zip(rows, noise, strict=True):
-        state, action, reward, goes_on, following = split(row)
-        unit = np.tanh(run_numpy(target_actor, following)) + np.clip(0.2 * disturbance, -0.5, 0.5)
-        unit = np.clip(unit, -1.0, 1.0)
-        y = reward + DISCOUNT * goes_on * min(q(twin, following, unit) for twin in target_twins)
-        errors.append(sum((run_numpy(twin, np.r_[state, action])[0] - y) ** 2 for twin in twins))
-        values.append(q(first, state, np.tanh(run_numpy(actor, state))))
-    return float(np.mean(errors)), -float(np.mean(values))
-
-
-def sac_rows(seen: SimpleNamespace, seed: int, rows: np.ndarray, noise: np.ndarray) -> tuple[float, float]:
-    actor = numpy_layers(seen, seen.old["actor"], "actor", seed)
-    twins, target_twins, new_twins = ([numpy_layers(seen, flat["critics"], "critics", index)
-                                       for index in (seed, seed + SEEDS)] for flat in (seen.old, seen.target, seen.new))
-    temperature = float(seen.temperature[seed])
-    errors, losses = [], []
-    for row, after, here in zip(rows, noise[0], noise[1], strict=True):
-        state, action, reward, goes_on, following = split(row)
-        unit, log_density = draw(actor, following, after)
-        value = min(q(twin, following, unit) for twin in target_twins) - temperature * log_density
-        y = reward + DISCOUNT * goes_on * value
-        errors.append(sum((run_numpy(twin, np.r_[state, action])[0] - y) ** 2 for twin in twins))
-        unit, log_density = draw(actor, state, here)
-        losses.append(temperature * log_density - min(q(twin, state, unit) for twin in new_twins))
-    return float(np.mean(errors)), float(np.mean(losses))
-
-
-def single_critic_rows(seen: SimpleNamespace, seed: int, rows: np.ndarray, noise: np.ndarray) -> tuple[float, float]:
-    """DDPG-argmax (with candidates `noise` [N, A]) and the regression."""
-    actor, target_actor = (numpy_layers(seen, flat["actor"], "actor", seed) for flat in (seen.old, seen.target))
-    critic, target_critic, new_critic = (numpy_layers(seen, flat["critic"], "critic", seed)
-                                         for flat in (seen.old, seen.target, seen.new))
-    errors, losses = [], []
-    for row in rows:
-        state, action, reward, goes_on, following = split(row)
-        y = reward + DISCOUNT * goes_on * q(target_critic, following, np.tanh(run_numpy(target_actor, following)))
-        errors.append((run_numpy(critic, np.r_[state, action])[0] - y) ** 2)
-        unit = np.tanh(run_numpy(actor, state))
-        if isinstance(seen.agent, DDPGArgmax):
-            goal = noise[np.argmax([q(new_critic, state, candidate) for candidate in noise])]
-            losses.append(np.sum((unit - goal) ** 2))
+def next_values(batch: Batch, targets: torch.Tensor, seed: int) -> list[tuple[np.ndarray, float, float]]:
+    """The next state of each item that is not terminal, the value Q' that its target was made from, and its index."""
+    rows = []
+    for index in range(BATCH):
+        y, reward = float(targets[seed, index]), float(batch.rewards[seed, index])
+        if float(batch.not_done[seed, index]) == 0.0:
+            assert y == reward
         else:
-            better = y > q(critic, state, unit)
-            losses.append(better * np.sum((unit - (action - CENTRE) / HALF) ** 2))
-    return float(np.mean(errors)), float(np.mean(losses))
+            rows.append((batch.next_observations[seed, index].double().numpy(), (y - reward) / DISCOUNT, index))
+    assert 0 < len(rows) < BATCH
+    return rows
 
 
-BY_HAND = {TD3: td3_rows, SAC: sac_rows, DDPGArgmax: single_critic_rows, DDPGRegression: single_critic_rows}
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_losses_equal_the_equations_row_by_row(kind: type[StackedAgent]) -> None:
-    seen = observed(kind)
+@pytest.mark.parametrize("kind", [DDPGArgmax])
+def test_targets_of_ddpg_equal_eq_1_2(kind: type[StackedAgent]) -> None:
+    agent = trained_agent(kind)
+    batch = batch_of(agent)
     for seed in range(SEEDS):
-        noise = seen.noise[seed].double().numpy() if seen.noise.ndim > 1 else np.empty(0)
-        critic_loss, actor_loss = BY_HAND[kind](seen, seed, seen.rows[seed].double().numpy(), noise)
-        assert float(seen.losses["critic_loss"][seed]) == pytest.approx(critic_loss, rel=1e-4)
-        assert float(seen.losses["actor_loss"][seed]) == pytest.approx(actor_loss, rel=1e-4, abs=1e-5)
+        actor, critic = numpy_network(agent.actor, seed, True), numpy_network(agent.critic, seed, True)
+        for state, value, _ in next_values(batch, agent.td_targets(batch), seed):
+            assert value == pytest.approx(q(critic, state, np.tanh(actor(state))), rel=1e-3, abs=1e-4)
 
 
-class Plain:
-    """The networks in the plainest words of torch, recorded for autograd."""
-
-    def __init__(self, seen: SimpleNamespace):
-        self.seen = seen
-        self.state, self.pairs, self.reward, self.goes_on, self.following = seen.agent._replay.unpack(seen.rows)
-        self.half, self.centre = (torch.tensor(values, dtype=torch.float32) for values in (HALF, CENTRE))
-
-    def run(self, name: str, flat: torch.Tensor, inputs: torch.Tensor) -> torch.Tensor:
-        *hidden, last = self.seen.agent._networks[name].network.split(flat)
-        for layer in hidden:
-            inputs = torch.relu(inputs @ layer.weight + layer.bias)
-        return inputs @ last.weight + last.bias
-
-    def q(self, name: str, flat: torch.Tensor, state: torch.Tensor, unit: torch.Tensor) -> torch.Tensor:
-        """Values [S, B, 1], or of both twins [2, S, B, 1]."""
-        pairs = torch.cat((state, self.centre + self.half * unit), 2)
-        if name == "critic":
-            return self.run(name, flat, pairs)
-        return self.run(name, flat, torch.cat((pairs, pairs))).view(2, SEEDS, BATCH, 1)
-
-    def y(self, next_values: torch.Tensor) -> torch.Tensor:
-        return self.reward + DISCOUNT * self.goes_on * next_values
-
-    def draw(self, actor: torch.Tensor, state: torch.Tensor, noise: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        mean, log_deviation = self.run("actor", actor, state).chunk(2, 2)
-        density = torch.distributions.Normal(mean, log_deviation.exp())
-        inner = mean + log_deviation.exp() * noise
-        return inner.tanh(), (density.log_prob(inner) - (1 - inner.tanh() ** 2).log()).sum(2, keepdim=True)
-
-    def twin_loss(self, critics: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
-        errors = self.run("critics", critics, self.pairs.repeat(2, 1, 1)) - y.repeat(2, 1, 1)
-        return errors.square().mean((1, 2)).sum()
-
-    def td3(self, actor: torch.Tensor, critics: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        noise = (0.2 * self.seen.noise).clamp(-0.5, 0.5)
-        unit = (self.run("actor", self.seen.target["actor"], self.following).tanh() + noise).clamp(-1, 1)
-        y = self.y(self.q("critics", self.seen.target["critics"], self.following, unit).amin(0))
-        unit = self.run("actor", actor, self.state).tanh()
-        return -self.q("critics", self.seen.new["critics"], self.state, unit)[0].mean((1, 2)).sum(), \
-            self.twin_loss(critics, y)
-
-    def sac(self, actor: torch.Tensor, critics: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        weight = self.seen.temperature[:, None, None]
-        unit, log_density = self.draw(self.seen.old["actor"], self.following, self.seen.noise[:, 0])
-        y = self.y(self.q("critics", self.seen.target["critics"], self.following, unit).amin(0) - weight * log_density)
-        unit, log_density = self.draw(actor, self.state, self.seen.noise[:, 1])
-        values = self.q("critics", self.seen.new["critics"], self.state, unit).amin(0)
-        return (weight * log_density - values).mean((1, 2)).sum(), self.twin_loss(critics, y)
-
-    def single_critic(self, actor: torch.Tensor, critic: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        unit = self.run("actor", self.seen.target["actor"], self.following).tanh()
-        y = self.y(self.q("critic", self.seen.target["critic"], self.following, unit))
-        critic_loss = (self.run("critic", critic, self.pairs) - y).square().mean((1, 2)).sum()
-        unit = self.run("actor", actor, self.state).tanh()
-        if isinstance(self.seen.agent, DDPGArgmax):
-            values = [self.q("critic", self.seen.new["critic"], self.state, candidate[:, None].expand_as(unit))
-                      for candidate in self.seen.noise.unbind(1)]
-            choice = torch.cat(values, 2).argmax(2)
-            goals = torch.stack([self.seen.noise[seed][choice[seed]] for seed in range(SEEDS)])
-            return (unit - goals).square().sum(2).mean(1).sum(), critic_loss
-        better = y > self.q("critic", self.seen.old["critic"], self.state, unit)
-        taken = (self.pairs[..., 3:] - self.centre) / self.half
-        return (better * (unit - taken).square()).sum(2).mean(1).sum(), critic_loss
+def test_targets_of_td3_are_the_smaller_twin_at_a_smoothed_action() -> None:
+    agent, noise = trained_agent(TD3), 3.0 * randn(SEEDS, BATCH, 2)
+    batch = batch_of(agent)
+    for seed in range(SEEDS):
+        actor = numpy_network(agent.actor, seed, True)
+        twins = [numpy_network(agent.critic, index, True) for index in (seed, seed + SEEDS)]
+        for state, value, index in next_values(batch, agent.smoothed_targets(batch, noise), seed):
+            disturbed = np.tanh(actor(state)) + np.clip(0.2 * noise[seed, index].double().numpy(), -0.5, 0.5)
+            expected = min(q(twin, state, np.clip(disturbed, -1.0, 1.0)) for twin in twins)
+            assert value == pytest.approx(expected, rel=1e-3, abs=1e-4)
 
 
-BY_AUTOGRAD = {TD3: Plain.td3, SAC: Plain.sac, DDPGArgmax: Plain.single_critic, DDPGRegression: Plain.single_critic}
+def test_targets_of_sac_are_the_smaller_twin_and_the_entropy() -> None:
+    agent, noise, temperature = trained_agent(SAC), randn(SEEDS, BATCH, 2), torch.tensor([0.3, 0.7])
+    batch = batch_of(agent)
+    for seed in range(SEEDS):
+        actor = numpy_network(agent.actor, seed)
+        twins = [numpy_network(agent.critic, index, True) for index in (seed, seed + SEEDS)]
+        for state, value, index in next_values(batch, agent.soft_targets(batch, noise, temperature), seed):
+            squashed, density = draw(actor, state, noise[seed, index].double().numpy())
+            expected = min(q(twin, state, squashed) for twin in twins) - float(temperature[seed]) * density
+            assert value == pytest.approx(expected, rel=1e-3, abs=1e-4)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_gradients_equal_autograd(kind: type[StackedAgent]) -> None:
-    seen = observed(kind)
-    leaves = [flat.clone().requires_grad_() for flat in seen.old.values()]
-    losses = BY_AUTOGRAD[kind](Plain(seen), *leaves)
-    for loss, leaf, net in zip(losses, leaves, seen.agent._networks.values(), strict=True):
-        (expected,) = torch.autograd.grad(loss, leaf, retain_graph=True)
-        torch.testing.assert_close(net.gradient.flat, expected, rtol=1e-3, atol=1e-5)
+def test_the_best_candidate_has_the_largest_value() -> None:
+    critic, observations, candidates = network(1, 3, 4, inputs=5), randn(SEEDS, 8, 3), randn(SEEDS, 9, 2).tanh()
+    best = best_candidates(critic.weights, observations, candidates, BOX)
+    for seed in range(SEEDS):
+        one = numpy_network(critic, seed)
+        for state, chosen in zip(observations[seed].double().numpy(), best[seed], strict=True):
+            values = [q(one, state, candidate) for candidate in candidates[seed].double().numpy()]
+            assert torch.equal(chosen, candidates[seed, int(np.argmax(values))])
 
 
 def test_sac_learns_the_temperature_from_the_entropy() -> None:
-    """The gradient of -log(temperature) (log-density + wanted entropy), with a wanted entropy of -2 for two actions."""
-    seen = observed(SAC)
-    plain = Plain(seen)
-    _, log_density = plain.draw(seen.old["actor"], plain.state, seen.noise[:, 1])
-    slope = seen.agent._log_temperature.gradient
-    torch.testing.assert_close(slope, 2.0 - log_density.mean((1, 2)), rtol=1e-4, atol=1e-5)
-    torch.testing.assert_close(seen.losses["temperature"], seen.temperature)
-
-
-def test_a_temperature_without_learning_rate_stays() -> None:
-    agent = SAC(3, LOW, HIGH, settings=SAC.settings_type(hidden=(8,), temperature=0.3, temperature_learning_rate=0.0))
-    agent.remember(*(np.zeros(shape) for shape in ((1, 9, 3), (1, 9, 2), (1, 9), (1, 9, 3), (1, 9))))
-    assert agent.train(5)["temperature"] == pytest.approx(0.3)
+    """Adam's first steps have the length of the learning rate, up where the policy has less entropy than wanted."""
+    agent = trained_agent(SAC, temperature=0.3)
+    temperature = agent.train(1)["temperature"]
+    assert ((np.abs(np.log(temperature / 0.3)) > 0.0) & (np.abs(np.log(temperature / 0.3)) < 0.1)).all()
+    fixed = trained_agent(SAC, temperature=0.3, temperature_learning_rate=0.0)
+    assert fixed.train(5)["temperature"] == pytest.approx(0.3)
 
 
 def test_sac_draws_from_the_density_that_it_learns_with() -> None:
     """The mean of 1/density over drawn actions is the size of the box, 2 x 2 in half-widths."""
-    agent = trained(SAC)
+    agent = trained_agent(SAC)
     observations = torch.zeros(SEEDS, 20_000, 3)
-    sample = agent._sample(observations, torch.randn(SEEDS, 20_000, 2, generator=torch.Generator().manual_seed(0)))
-    np.testing.assert_allclose((-sample.log_density).exp().mean(dim=(1, 2)), 4.0, rtol=0.1)
+    squashed, log_density = losses.sample_squashed(agent.actor.weights(observations), randn(SEEDS, 20_000, 2))
+    np.testing.assert_allclose((-log_density).exp().mean(dim=(1, 2)), 4.0, rtol=0.1)
     drawn = agent.explore(observations.numpy())
-    np.testing.assert_allclose(drawn.mean(axis=1), (CENTRE + HALF * sample.unit.numpy()).mean(axis=1), atol=0.15)
+    np.testing.assert_allclose(drawn.mean(axis=1), (CENTRE + HALF * squashed.numpy()).mean(axis=1), atol=0.15)
     assert not np.array_equal(drawn, agent.explore(observations.numpy()))
 
 
-def test_sac_cuts_off_the_log_deviation_and_its_slope() -> None:
-    agent = trained(SAC)
-    agent._actor.weights.layers[-1].bias[..., 2:] = torch.tensor([50.0, -50.0])
-    sample = agent._sample(torch.zeros(SEEDS, 1, 3), torch.zeros(SEEDS, 1, 2))
-    torch.testing.assert_close(sample.deviation[0, 0], torch.tensor([2.0, -20.0]).exp())
-    assert not sample.free.any()
+def test_the_log_standard_deviation_is_bounded_and_has_no_gradient_beyond() -> None:
+    outputs = torch.tensor([[[0.0, 0.0, 50.0, -50.0]]], requires_grad=True)
+    noise = torch.tensor([[[1e-3, 1e6]]])
+    squashed, log_density = losses.sample_squashed(outputs, noise)
+    torch.testing.assert_close(squashed[0, 0], (noise[0, 0] * torch.tensor([2.0, -20.0]).exp()).tanh())
+    (gradient,) = torch.autograd.grad(log_density.sum(), outputs)
+    assert gradient[0, 0, 2:].tolist() == [0.0, 0.0]
 
 
-def test_td3_leaves_actor_and_targets_alone_in_every_other_update() -> None:
-    agent = trained(TD3).clone()
-    agent.settings = TD3.settings_type(hidden=(16, 12), batch_size=BATCH, policy_delay=2)
-    before = {name: tensor.clone() for name, tensor in agent._tensors().items()}
+def test_td3_changes_actor_and_targets_in_every_other_update_only() -> None:
+    agent = trained_agent(TD3)
+    before = agent.state_dict()
     assert agent.train(1)["actor_loss"].tolist() == [0.0, 0.0]  # the 21st
-    same = {name for name, tensor in agent._tensors().items() if torch.equal(tensor, before[name])}
-    assert same == {"actor/weights", "actor/target", "actor/mean", "actor/square", "critics/target"}
+    after = agent.state_dict()
+    networks = {name for name in before if name.startswith(("actor/", "critic/"))}
+    same = {name for name in networks if np.array_equal(after[name], before[name])}
+    assert same == {"actor/weights", "actor/target", "actor/mean", "actor/square", "critic/target"}
     agent.train(1)
-    assert not any(torch.equal(tensor, before[name]) for name, tensor in agent._tensors().items())
+    assert not any(np.array_equal(agent.state_dict()[name], before[name]) for name in networks)

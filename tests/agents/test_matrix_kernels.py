@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pbcs_ompl.agents.matrix_kernels import product, transpose
+from pbcs_ompl.agents.kernels.matrix import product, transpose
 
 SIDE = st.integers(1, 70)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from pbcs_ompl.agents import network_kernels as kernels
-from pbcs_ompl.agents.networks import MLP, Weights
-from pbcs_ompl.agents.trained_network import TrainedNetwork, adam_rates
+from pbcs_ompl.agents.kernels import network as kernels
+from pbcs_ompl.agents.kernels.gradients import backward, forward, input_gradient
+from pbcs_ompl.agents.networks import MLP, TrainedNetwork, Weights, adam_rates
 
 CPU = torch.device("cpu")
 
@@ -16,7 +16,7 @@ def generators(*seeds: int) -> list[torch.Generator]:
 
 
 def reference(network: MLP, flat: torch.Tensor, inputs: torch.Tensor) -> torch.Tensor:
-    """The same network in the plainest words of torch, recorded for autograd."""
+    """The same network in the simplest form, recorded for autograd."""
     layers = network.split(flat)
     for weight, bias, norm in layers[:-1]:
         inputs = inputs @ weight + bias
@@ -28,43 +28,44 @@ def reference(network: MLP, flat: torch.Tensor, inputs: torch.Tensor) -> torch.T
 
 @pytest.mark.parametrize("layer_norm", [False, True])
 @pytest.mark.parametrize("sizes", [(3, 16, 8, 2), (5, 7, 1), (2, 20, 20, 20, 3)])
-def test_gradients_equal_autograd(sizes: tuple[int, ...], layer_norm: bool) -> None:
+def test_outputs_and_gradients_equal_those_of_plain_torch(sizes: tuple[int, ...], layer_norm: bool) -> None:
     network = MLP(sizes, layer_norm)
     flat = network.initial(generators(1, 2, 3)) + 0.1 * torch.randn(3 * network.num_parameters)
-    inputs, slope = torch.randn(3, 11, sizes[0]), torch.randn(3, 11, sizes[-1])
+    inputs, grad = torch.randn(3, 11, sizes[0]), torch.randn(3, 11, sizes[-1])
     weights, gradient = Weights(network, flat), Weights(network, torch.zeros_like(flat))
-    outputs, tape = network.forward(weights, inputs)
-    network.backward(weights, tape, slope, gradient)
+    outputs, activations = forward(weights, inputs)
+    backward(weights, activations, grad, gradient)
 
     flat_leaf, input_leaf = flat.clone().requires_grad_(), inputs.clone().requires_grad_()
     expected = reference(network, flat_leaf, input_leaf)
-    by_weights, by_inputs = torch.autograd.grad((expected * slope).sum(), (flat_leaf, input_leaf))
+    by_weights, by_inputs = torch.autograd.grad((expected * grad).sum(), (flat_leaf, input_leaf))
     torch.testing.assert_close(outputs, expected.detach(), rtol=1e-5, atol=1e-5)
+    torch.testing.assert_close(weights(inputs), outputs, rtol=0.0, atol=0.0)
     torch.testing.assert_close(gradient.flat, by_weights, rtol=1e-4, atol=1e-5)
-    torch.testing.assert_close(network.input_slope(weights, tape, slope), by_inputs, rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(input_gradient(weights, activations, grad), by_inputs, rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.parametrize("sizes", [(3, 16, 8, 2), (4, 33, 40, 1)])
 def test_kernels_equal_torch_for_every_seed_of_a_stack(sizes: tuple[int, ...]) -> None:
     network, batch, seeds = MLP(sizes), 13, 3
     flat = network.initial(generators(1, 2, 3))
-    inputs, slope = torch.randn(seeds, batch, sizes[0]), torch.randn(seeds, batch, sizes[-1])
+    inputs, grad = torch.randn(seeds, batch, sizes[0]), torch.randn(seeds, batch, sizes[-1])
     weights, gradient = Weights(network, flat), Weights(network, torch.zeros_like(flat))
-    outputs, tape = network.forward(weights, inputs)
-    network.backward(weights, tape, slope, gradient)
-    into_inputs = network.input_slope(weights, tape, slope)
+    outputs, activations = forward(weights, inputs)
+    backward(weights, activations, grad, gradient)
+    into_inputs = input_gradient(weights, activations, grad)
     for seed in range(seeds):
-        values = np.zeros(kernels.tape_length(sizes, batch), np.float32)
-        slopes, own = np.zeros_like(values), np.zeros(network.num_parameters, np.float32)
+        values = np.zeros(kernels.num_activations(sizes, batch), np.float32)
+        grads, own = np.zeros_like(values), np.zeros(network.num_parameters, np.float32)
         values[: batch * sizes[0]] = inputs[seed].numpy().ravel()
         kernels.forward(sizes, flat.numpy(), seeds, seed, values, batch)
-        start = kernels.outputs_at(sizes, batch)
+        start = kernels.outputs_offset(sizes, batch)
         np.testing.assert_allclose(values[start:], outputs[seed].numpy().ravel(), rtol=1e-5, atol=1e-5)
-        slopes[start:] = slope[seed].numpy().ravel()
-        kernels.backward(sizes, flat.numpy(), seeds, seed, values, slopes, batch, own, True)
+        grads[start:] = grad[seed].numpy().ravel()
+        kernels.backward(sizes, flat.numpy(), seeds, seed, values, grads, batch, own, True)
         expected = [part[seed].numpy().ravel() for layer in gradient.layers for part in layer[:2]]
         np.testing.assert_allclose(own, np.concatenate(expected), rtol=1e-4, atol=1e-5)
-        down = slopes[: batch * sizes[0]]
+        down = grads[: batch * sizes[0]]
         np.testing.assert_allclose(down, into_inputs[seed].numpy().ravel(), rtol=1e-4, atol=1e-5)
 
 
@@ -80,20 +81,20 @@ def test_adam_and_target_equal_torch_optim(way: str) -> None:
         optimiser.step()
         target = 0.9 * target + 0.1 * leaf.detach()
         if way == "torch":
-            net.descend(rates[step])
-            net.follow(0.9)
+            net.step(rates[step])
+            net.update_target(0.9)
         else:
             for seed in range(2):
-                descend_with_kernel(net, seed, rates[step])
+                step_with_kernel(net, seed, rates[step])
     torch.testing.assert_close(net.weights.flat, leaf.detach(), rtol=1e-5, atol=1e-6)
     torch.testing.assert_close(net.target.flat, target, rtol=1e-5, atol=1e-6)
 
 
-def descend_with_kernel(net: TrainedNetwork, seed: int, rate: torch.Tensor) -> None:
+def step_with_kernel(net: TrainedNetwork, seed: int, rate: torch.Tensor) -> None:
     sizes, weights = net.network.sizes, net.weights.flat.numpy()
     own = torch.cat([part[seed].ravel() for layer in net.gradient.layers for part in layer[:2]]).numpy()
-    kernels.descend(sizes, weights, net.mean.numpy(), net.square.numpy(), 2, seed, own, rate.numpy())
-    kernels.follow(sizes, weights, net.target.flat.numpy(), 2, seed, np.float32(0.1))
+    kernels.adam_step(sizes, weights, net.mean.numpy(), net.square.numpy(), 2, seed, own, rate.numpy())
+    kernels.polyak_update(sizes, weights, net.target.flat.numpy(), 2, seed, np.float32(0.1))
 
 
 def test_a_stack_is_initialised_like_its_seeds_alone() -> None:
@@ -104,3 +105,30 @@ def test_a_stack_is_initialised_like_its_seeds_alone() -> None:
         assert torch.equal(together.weight[1], single.weight[0])
         assert torch.equal(together.bias[1], single.bias[0])
         assert single.weight.abs().max() <= single.weight.shape[1] ** -0.5
+
+
+def test_the_first_networks_of_a_stack_are_views_of_it() -> None:
+    net = TrainedNetwork(MLP((3, 8, 2), layer_norm=True), generators(1, 2, 3, 4), CPU)
+    inputs = torch.randn(4, 5, 3)
+    first = net.weights.first(2)
+    torch.testing.assert_close(first(inputs[:2]), net.weights(inputs)[:2])
+    net.weights.flat.mul_(2.0)
+    torch.testing.assert_close(first(inputs[:2]), net.weights(inputs)[:2])
+
+
+def test_autograd_takes_any_loss_and_what_it_returns_beside_it() -> None:
+    net = TrainedNetwork(MLP((3, 8, 1)), generators(1, 2), CPU)
+    inputs = torch.randn(2, 5, 3)
+
+    def loss(weights: Weights, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        values = weights(inputs)
+        return values.abs().mean(dim=(1, 2)), values
+
+    with torch.no_grad():
+        losses, values = net.autograd(loss, inputs)
+    leaf = net.weights.flat.clone().requires_grad_()
+    (expected,) = torch.autograd.grad(reference(net.network, leaf, inputs).abs().mean(dim=(1, 2)).sum(), leaf)
+    torch.testing.assert_close(net.gradient.flat, expected)
+    torch.testing.assert_close(values, net.weights(inputs))
+    assert not losses.requires_grad
+    assert not values.requires_grad

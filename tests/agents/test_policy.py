@@ -29,7 +29,7 @@ def test_policy_does_not_change_with_the_agent() -> None:
     rng = np.random.default_rng(0)
     policy, observations = agent.policy(), rng.normal(size=(5, 3))
     before = policy.act(observations)
-    agent.remember(rng.normal(size=(2, 50, 3)), rng.random((2, 50, 2)), rng.random((2, 50)),
+    agent.add_transitions(rng.normal(size=(2, 50, 3)), rng.random((2, 50, 2)), rng.random((2, 50)),
                    rng.normal(size=(2, 50, 3)), np.zeros((2, 50)))
     agent.train(20)
     assert np.array_equal(policy.act(observations), before)

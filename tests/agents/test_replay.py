@@ -75,8 +75,8 @@ def test_fields_come_back_where_they_belong() -> None:
                np.array([[1.0]]))
     batch = replay.unpack(replay.sample(1, 1)[0])
     assert batch.observations.tolist() == [[[1.0, 2.0]]]
-    assert batch.pairs.tolist() == [[[1.0, 2.0, 3.0]]]
-    assert (batch.rewards.item(), batch.continues.item()) == (4.0, 0.0)
+    assert batch.obs_actions.tolist() == [[[1.0, 2.0, 3.0]]]
+    assert (batch.rewards.item(), batch.not_done.item()) == (4.0, 0.0)
     assert batch.next_observations.tolist() == [[[5.0, 6.0]]]
 
 

@@ -1,4 +1,4 @@
-"""The example of somebody else's agent keeps the promises of `pbcs_ompl.skills.agent_door`."""
+"""The example of a third-party agent obeys `pbcs_ompl.skills.agent_door`."""
 
 import sys
 from pathlib import Path
@@ -26,7 +26,7 @@ def kind(monkeypatch):
 def filled(kind):
     agent = kind(3, LOW, HIGH, settings=TD3Settings(hidden=(16, 12), batch_size=32), seeds=(0,))
     rng = np.random.default_rng(0)
-    agent.remember(rng.normal(size=(1, 60, 3)), rng.uniform(LOW, HIGH, (1, 60, 2)), rng.normal(size=(1, 60)),
+    agent.add_transitions(rng.normal(size=(1, 60, 3)), rng.uniform(LOW, HIGH, (1, 60, 2)), rng.normal(size=(1, 60)),
                    rng.normal(size=(1, 60, 3)), rng.random((1, 60)) < 0.2)
     return agent
 
@@ -42,7 +42,7 @@ def test_actions_values_and_policy_agree(kind):
     assert agent.num_updates == 5
 
 
-def test_it_goes_on_from_what_was_saved(kind):
+def test_it_continues_from_a_saved_state(kind):
     first, second = filled(kind), filled(kind)
     first.train(5)
     second.load_state_dict(first.state_dict())
@@ -52,11 +52,11 @@ def test_it_goes_on_from_what_was_saved(kind):
         assert np.array_equal(mine[name], theirs[name]), name
     second.train(3)
     assert second.num_updates == 8
-    second.forget()
+    second.clear_replay()
     assert second.state_dict()["rewards"].size == 0
 
 
-def test_the_door_names_what_is_wrong():
+def test_errors_name_what_is_missing():
     with pytest.raises(UnknownName, match="'td3'"):
         load_agent("tdd3")
     with pytest.raises(PbcsError, match="no_such_module"):

@@ -37,7 +37,7 @@ def training(seeds: int, steps: int, patience: int = 0) -> StackedTraining:
 def updates_alone(seeds: int, steps: int) -> Callable[[], object]:
     filled = agent(seeds)
     rng, shape = np.random.default_rng(0), (seeds, 1000)
-    filled.remember(rng.random((*shape, 1)), rng.uniform(-0.1, 0.1, (*shape, 1)), rng.random(shape),
+    filled.add_transitions(rng.random((*shape, 1)), rng.uniform(-0.1, 0.1, (*shape, 1)), rng.random(shape),
                     rng.random((*shape, 1)), rng.random(shape) < 0.1)
 
     def run() -> None:
@@ -65,11 +65,11 @@ def bytes_of_a_seed(steps: int) -> dict[str, int]:
     """Count the tensors of a stack of two whose seeds have made N steps, for each seed."""
     stack = agent(2)
     vectors, numbers = np.zeros((2, steps, 1)), np.zeros((2, steps))
-    stack.remember(vectors, vectors, numbers, vectors, numbers)
-    networks = sum(tensor.numel() * tensor.element_size() for network in stack._networks.values()
+    stack.add_transitions(vectors, vectors, numbers, vectors, numbers)
+    networks = sum(tensor.numel() * tensor.element_size() for network in (stack.actor, stack.critic)
                    for tensor in (*network.tensors().values(), network.gradient.flat))
     return {"networks, targets, gradients, Adam's moments": networks // 2,
-            f"replay buffer after {steps:,} steps": stack._replay._rows.nbytes // 2}
+            f"replay buffer after {steps:,} steps": stack.replay.state_dict()["rows"].nbytes // 2}
 
 
 def main() -> None:

@@ -49,7 +49,7 @@ def ours(name: str, hidden: tuple[int, ...], seeds: int, compile: Compile) -> Ca
     kind = ALGORITHMS[name]
     agent = kind(OBSERVATIONS, [-1.0] * ACTIONS, [1.0] * ACTIONS, settings=kind.settings_type(hidden=hidden),
                  seeds=range(seeds), compile=compile)
-    agent.remember(*(np.stack([field] * seeds) for field in transitions(FILL)))
+    agent.add_transitions(*(np.stack([field] * seeds) for field in transitions(FILL)))
     return agent.train
 
 

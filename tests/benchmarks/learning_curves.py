@@ -61,7 +61,7 @@ def ours(name: str, seeds: int, steps: int) -> np.ndarray:
         actions = noise.apply(actions, noise.draw(rng, (seeds, 1), 1), fresh, low, high)
         outcomes = [env.step(action[0].astype(np.float32)) for env, action in zip(envs, actions, strict=True)]
         following, rewards = np.array([outcome[0] for outcome in outcomes]), np.array([[o[1]] for o in outcomes])
-        agent.remember(observations[:, None], actions, rewards, following[:, None], fresh)
+        agent.add_transitions(observations[:, None], actions, rewards, following[:, None], fresh)
         observations = following if step % EPISODE else np.array([env.reset()[0] for env in envs])
         if step > WARM_UP:
             agent.train(1)

@@ -1,4 +1,4 @@
-"""What every registered agent promises, in an action box that is neither symmetric nor a cube."""
+"""Laws of every registered agent, in an action box that is neither symmetric nor a cube."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def data(seed, count=200):
 
 
 def fill(agent, *seeds):
-    agent.remember(*(np.stack(field) for field in zip(*(data(seed) for seed in seeds), strict=True)))
+    agent.add_transitions(*(np.stack(field) for field in zip(*(data(seed) for seed in seeds), strict=True)))
     return agent
 
 
@@ -74,6 +74,17 @@ def test_a_stack_equals_separate_agents(entry, layer_norm):
             np.testing.assert_allclose(losses[name][index], own[name][0], rtol=1e-4)
 
 
+@pytest.mark.parametrize("layer_norm", [False, True])
+def test_kernels_make_the_updates_of_autograd(entry, layer_norm):
+    reference = type("Reference", (entry,), {"gradients": {}})
+    fast, plain = (fill(make(kind, 5, 6, layer_norm=layer_norm), 0, 1) for kind in (entry, reference))
+    mine, theirs = fast.train(100), plain.train(100)
+    for name in mine:
+        np.testing.assert_allclose(mine[name], theirs[name], rtol=1e-4)
+    for name, array in plain.state_dict().items():
+        np.testing.assert_allclose(fast.state_dict()[name], array, atol=1e-5, err_msg=name)
+
+
 def test_changing_one_seed_leaves_the_others_bit_equal(entry):
     first, second = fill(make(entry, 5, 6, 7), 0, 1, 2), fill(make(entry, 5, 8, 7), 0, 9, 2)
     for agent in (first, second):
@@ -83,7 +94,7 @@ def test_changing_one_seed_leaves_the_others_bit_equal(entry):
     assert not np.array_equal(mine[1], theirs[1])
 
 
-def test_saved_and_loaded_agents_go_on_bit_for_bit(entry):
+def test_saved_and_loaded_agents_continue_bit_for_bit(entry):
     first = fill(make(entry, 1, 2), 3, 4)
     first.train(31)
     first.explore(np.zeros((2, 5, 3)))
@@ -103,7 +114,7 @@ def test_saved_and_loaded_agents_go_on_bit_for_bit(entry):
     assert first.num_updates == 58
 
 
-def test_a_clone_goes_on_alone(entry):
+def test_a_clone_is_independent(entry):
     agent = fill(make(entry, 1), 3)
     agent.train(5)
     copy, before = agent.clone(), probe(agent)
@@ -114,7 +125,7 @@ def test_a_clone_goes_on_alone(entry):
 
 
 @pytest.mark.parametrize("layer_norm", [False, True])
-def test_a_part_of_a_stack_goes_on_as_it_would_have_in_the_whole(entry, layer_norm):
+def test_a_part_of_a_stack_trains_as_it_would_have_in_the_whole(entry, layer_norm):
     whole = fill(make(entry, 5, 6, 7, 8, layer_norm=layer_norm), 0, 1, 2, 3)
     whole.train(21)
     whole.explore(np.zeros((4, 5, 3)))
@@ -159,7 +170,7 @@ def test_impossible_boxes_are_refused(entry, low, high, match):
         entry(2, low, high)
 
 
-def test_devices_that_are_not_there_are_named(entry):
+def test_unavailable_devices_are_named(entry):
     with pytest.raises(InvalidOption, match="abacus"):
         entry(2, [-1.0], [1.0], device="abacus")
     if not torch.cuda.is_available():
@@ -175,15 +186,15 @@ def test_settings_out_of_range_are_named(entry, wrong):
         entry.settings_type(**wrong)
 
 
-def test_bad_transitions_are_refused_and_nothing_is_kept(entry):
+def test_bad_transitions_are_refused_and_none_is_added(entry):
     agent = make(entry, 1)
     fields = [field[None] for field in data(0, 10)]
     wrong = [*fields[:1], fields[1][..., :1], *fields[2:]]
     with pytest.raises(InvalidOption, match=r"actions have the shape \(1, 10, 1\), expected \(1, 10, 2\)"):
-        agent.remember(*wrong)
+        agent.add_transitions(*wrong)
     fields[0][0, 3, 1] = np.nan
     with pytest.raises(NonFiniteData, match="observations hold NaN or infinity, after update 0"):
-        agent.remember(*fields)
+        agent.add_transitions(*fields)
     assert agent.replay_sizes.tolist() == [0]
     with pytest.raises(InvalidOption, match="no transitions"):
         agent.train(1)
@@ -192,8 +203,8 @@ def test_bad_transitions_are_refused_and_nothing_is_kept(entry):
 def test_a_nan_in_a_loss_names_seed_and_update(entry):
     agent = fill(make(entry, 8, 9), 0, 1)
     agent.train(3)
-    agent._networks["actor"].target.flat.fill_(float("nan"))
-    agent._networks["actor"].weights.flat.fill_(float("nan"))
+    agent.actor.target.flat.fill_(float("nan"))
+    agent.actor.weights.flat.fill_(float("nan"))
     with pytest.raises(NonFiniteData, match="loss of seed 8 is nan in update 4"):
         agent.train(10)
 
@@ -213,7 +224,7 @@ def test_it_solves_a_bandit_and_values_it(entry):
     agent = entry(1, [-1.0], [1.0], settings=entry.settings_type(hidden=(24, 24), batch_size=32), seeds=(0, 1))
     actions = np.random.default_rng(0).uniform(-1, 1, (2, 2000, 1))
     zeros = np.zeros((2, 2000, 1))
-    agent.remember(zeros, actions, -np.square(actions[..., 0] - 0.3), zeros, np.ones((2, 2000)))
+    agent.add_transitions(zeros, actions, -np.square(actions[..., 0] - 0.3), zeros, np.ones((2, 2000)))
     agent.train(1500)
     np.testing.assert_allclose(agent.act(np.zeros((2, 1, 1))), 0.3, atol=0.15)
     probed = np.linspace(-0.9, 0.9, 7)[None, :, None].repeat(2, axis=0)

@@ -152,7 +152,7 @@ class StackedTraining:
         generators = [self._generators[index] for index in self.active]
         draws = draw_all(self.noise, generators, shape, len(model.action_low))
         parts = [self._step(draws[:, step]) for step in range(settings.block)]
-        self.agent.remember(*(np.concatenate(part, axis=1) for part in zip(*parts, strict=True)))
+        self.agent.add_transitions(*(np.concatenate(part, axis=1) for part in zip(*parts, strict=True)))
 
     def _step(self, draws: Array) -> tuple[NDArray[Any], ...]:
         """Make one step; return observations, actions, rewards, next observations and terminals [S, B, ...]."""

@@ -75,7 +75,7 @@ def _fill_without_reward(agent: StackedAgent, count: int) -> None:
     rng = np.random.default_rng(0)
     states, controls = rng.uniform(0.0, 1.0, shape), rng.uniform(model.action_low, model.action_high, shape)
     outcome = model.transition(states, controls)
-    agent.remember(*(values.reshape(len(agent.seeds), count, *values.shape[1:]) for values in (
+    agent.add_transitions(*(values.reshape(len(agent.seeds), count, *values.shape[1:]) for values in (
         states, controls, outcome.rewards, outcome.states, outcome.terminated)))
 
 

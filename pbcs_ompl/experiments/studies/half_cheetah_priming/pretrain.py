@@ -51,7 +51,7 @@ def main(seed: int) -> None:
                 reward = (after[:, X] - state[:, X]) / seconds - CONTROL_COST * np.square(action).sum(axis=1)
                 rows.append((observation, action, reward, model.observe(after), np.zeros(1)))
                 state = after
-            agent.remember(*(np.stack(part, axis=1) for part in zip(*rows, strict=True)))
+            agent.add_transitions(*(np.stack(part, axis=1) for part in zip(*rows, strict=True)))
             if episode >= WARM_UP:
                 agent.train(BLOCK)
         if episode % 10 == 9:

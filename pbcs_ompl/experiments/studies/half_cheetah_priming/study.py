@@ -63,5 +63,5 @@ def _episode(model: ResettableModel, actor: Policy, start: int, noise: float, rn
         state = outcome.states
     episode: list[Array] = [np.stack(part, axis=1) for part in zip(*parts, strict=True)]
     if agent is not None:
-        agent.remember(*episode)
+        agent.add_transitions(*episode)
     return float(episode[2].sum())

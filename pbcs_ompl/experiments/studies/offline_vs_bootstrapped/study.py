@@ -71,7 +71,7 @@ def _mini_batches(model: ResettableModel, seeds: list[int], explored: int, count
 def _fill(agent: StackedAgent, model: ResettableModel, count: int) -> None:
     """Fill each seed's replay buffer with an exploration of its own. No state is terminal in chapter 4."""
     found = [explore(model, count, seed + 1) for seed in agent.seeds]
-    agent.remember(*(np.stack([getattr(one, name) for one in found])
+    agent.add_transitions(*(np.stack([getattr(one, name) for one in found])
                      for name in ("states", "controls", "rewards", "next_states")), np.zeros((len(found), count)))
 
 

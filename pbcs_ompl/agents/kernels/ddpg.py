@@ -1,11 +1,11 @@
-"""The update of `ddpg.py` as one kernel: what runs on a CPU, seed by seed, many updates in one call."""
+"""DDPG as one kernel for a CPU: seed by seed, many updates in one call."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
 
-from pbcs_ompl.agents import network_kernels as nets
+from pbcs_ompl.agents.kernels import network as nets
 
 
 class Stack(NamedTuple):
@@ -25,18 +25,18 @@ class Constants(NamedTuple):
     half: np.ndarray
     centre: np.ndarray
     discount: np.float32
-    share: np.float32
+    tau: np.float32
     """1 - polyak"""
 
 
 class Scratch(NamedTuple):
     """Working memory of one seed."""
 
-    actor_tape: np.ndarray
-    actor_slopes: np.ndarray
+    actor_activations: np.ndarray
+    actor_grads: np.ndarray
     actor_gradient: np.ndarray
-    critic_tape: np.ndarray
-    critic_slopes: np.ndarray
+    critic_activations: np.ndarray
+    critic_grads: np.ndarray
     critic_gradient: np.ndarray
     targets: np.ndarray
 
@@ -60,18 +60,18 @@ def _update_seed(rows: np.ndarray, rates: np.ndarray, seed: int, actor: Stack, c
     scratch = _scratch(actor, critic, rows.shape[1])
     for k in range(rows.shape[0]):
         losses[k, 0] = _critic_gradient(rows[k], seed, actor, critic, constants, scratch)
-        nets.descend(critic.sizes, critic.weights, critic.mean, critic.square, critic.seeds, seed,
+        nets.adam_step(critic.sizes, critic.weights, critic.mean, critic.square, critic.seeds, seed,
                      scratch.critic_gradient, rates[k, 1])
         losses[k, 1] = _actor_gradient(rows[k], seed, actor, critic, constants, scratch)
-        nets.descend(actor.sizes, actor.weights, actor.mean, actor.square, actor.seeds, seed,
+        nets.adam_step(actor.sizes, actor.weights, actor.mean, actor.square, actor.seeds, seed,
                      scratch.actor_gradient, rates[k, 0])
-        nets.follow(actor.sizes, actor.weights, actor.target, actor.seeds, seed, constants.share)
-        nets.follow(critic.sizes, critic.weights, critic.target, critic.seeds, seed, constants.share)
+        nets.polyak_update(actor.sizes, actor.weights, actor.target, actor.seeds, seed, constants.tau)
+        nets.polyak_update(critic.sizes, critic.weights, critic.target, critic.seeds, seed, constants.tau)
 
 
 @njit(cache=True)
 def _scratch(actor: Stack, critic: Stack, batch: int) -> Scratch:
-    long, short = nets.tape_length(critic.sizes, batch), nets.tape_length(actor.sizes, batch)
+    long, short = nets.num_activations(critic.sizes, batch), nets.num_activations(actor.sizes, batch)
     return Scratch(np.empty(short, np.float32), np.empty(short, np.float32),
                    np.empty(len(actor.weights) // actor.seeds, np.float32),
                    np.empty(long, np.float32), np.empty(long, np.float32),
@@ -80,45 +80,45 @@ def _scratch(actor: Stack, critic: Stack, batch: int) -> Scratch:
 
 @njit(cache=True)
 def _act(actor: Stack, flat: np.ndarray, seed: int, observations: np.ndarray, constants: Constants,
-         tape: np.ndarray, pairs: np.ndarray) -> None:
+         activations: np.ndarray, obs_actions: np.ndarray) -> None:
     """Run the actor `flat` on observations [B, O].
 
-    tanh(outputs) stays at the end of its tape, the critic's inputs in `pairs`.
+    tanh(outputs) stays at the end of its activations, the critic's inputs in `obs_actions`.
     """
     batch, width = observations.shape
     actions = actor.sizes[-1]
     for item in range(batch):
         for i in range(width):
-            tape[item * width + i] = observations[item, i]
-            pairs[item * (width + actions) + i] = observations[item, i]
-    nets.forward(actor.sizes, flat, actor.seeds, seed, tape, batch)
-    out = nets.outputs_at(actor.sizes, batch)
+            activations[item * width + i] = observations[item, i]
+            obs_actions[item * (width + actions) + i] = observations[item, i]
+    nets.forward(actor.sizes, flat, actor.seeds, seed, activations, batch)
+    out = nets.outputs_offset(actor.sizes, batch)
     for item in range(batch):
         for a in range(actions):
-            unit = np.tanh(tape[out + item * actions + a])
-            tape[out + item * actions + a] = unit
-            pairs[item * (width + actions) + width + a] = constants.centre[a] + constants.half[a] * unit
+            squashed = np.tanh(activations[out + item * actions + a])
+            activations[out + item * actions + a] = squashed
+            obs_actions[item * (width + actions) + width + a] = constants.centre[a] + constants.half[a] * squashed
 
 
 @njit(cache=True)
 def _critic_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, constants: Constants,
                      scratch: Scratch) -> float:
     batch, pair = rows.shape[0], critic.sizes[0]
-    tape, out = scratch.critic_tape, nets.outputs_at(critic.sizes, batch)
-    _act(actor, actor.target, seed, rows[:, pair + 2 :], constants, scratch.actor_tape, tape)
-    nets.forward(critic.sizes, critic.target, critic.seeds, seed, tape, batch)
+    activations, out = scratch.critic_activations, nets.outputs_offset(critic.sizes, batch)
+    _act(actor, actor.target, seed, rows[:, pair + 2 :], constants, scratch.actor_activations, activations)
+    nets.forward(critic.sizes, critic.target, critic.seeds, seed, activations, batch)
     for item in range(batch):
-        following = constants.discount * rows[item, pair + 1] * tape[out + item]
-        scratch.targets[item] = rows[item, pair] + following
+        future = constants.discount * rows[item, pair + 1] * activations[out + item]
+        scratch.targets[item] = rows[item, pair] + future
         for i in range(pair):
-            tape[item * pair + i] = rows[item, i]
-    nets.forward(critic.sizes, critic.weights, critic.seeds, seed, tape, batch)
+            activations[item * pair + i] = rows[item, i]
+    nets.forward(critic.sizes, critic.weights, critic.seeds, seed, activations, batch)
     loss = np.float32(0.0)
     for item in range(batch):
-        error = tape[out + item] - scratch.targets[item]
+        error = activations[out + item] - scratch.targets[item]
         loss += error * error
-        scratch.critic_slopes[out + item] = error * np.float32(2.0 / batch)
-    nets.backward(critic.sizes, critic.weights, critic.seeds, seed, tape, scratch.critic_slopes, batch,
+        scratch.critic_grads[out + item] = error * np.float32(2.0 / batch)
+    nets.backward(critic.sizes, critic.weights, critic.seeds, seed, activations, scratch.critic_grads, batch,
                   scratch.critic_gradient, False)
     return loss / batch
 
@@ -127,22 +127,22 @@ def _critic_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, c
 def _actor_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, constants: Constants,
                     scratch: Scratch) -> float:
     batch, size, pair = rows.shape[0], actor.sizes[0], critic.sizes[0]
-    tape, out = scratch.critic_tape, nets.outputs_at(critic.sizes, batch)
-    _act(actor, actor.weights, seed, rows[:, :size], constants, scratch.actor_tape, tape)
-    nets.forward(critic.sizes, critic.weights, critic.seeds, seed, tape, batch)
+    activations, out = scratch.critic_activations, nets.outputs_offset(critic.sizes, batch)
+    _act(actor, actor.weights, seed, rows[:, :size], constants, scratch.actor_activations, activations)
+    nets.forward(critic.sizes, critic.weights, critic.seeds, seed, activations, batch)
     loss = np.float32(0.0)
     for item in range(batch):
-        loss -= tape[out + item]
-        scratch.critic_slopes[out + item] = np.float32(-1.0 / batch)
-    nets.backward(critic.sizes, critic.weights, critic.seeds, seed, tape, scratch.critic_slopes, batch,
+        loss -= activations[out + item]
+        scratch.critic_grads[out + item] = np.float32(-1.0 / batch)
+    nets.backward(critic.sizes, critic.weights, critic.seeds, seed, activations, scratch.critic_grads, batch,
                   np.empty(0, np.float32), True)
-    out, actions = nets.outputs_at(actor.sizes, batch), pair - size
+    out, actions = nets.outputs_offset(actor.sizes, batch), pair - size
     for item in range(batch):
         for a in range(actions):
-            unit = scratch.actor_tape[out + item * actions + a]
-            slope = scratch.critic_slopes[item * pair + size + a] * constants.half[a]
-            scratch.actor_slopes[out + item * actions + a] = slope * (np.float32(1.0) - unit * unit)
-    nets.backward(actor.sizes, actor.weights, actor.seeds, seed, scratch.actor_tape, scratch.actor_slopes,
+            squashed = scratch.actor_activations[out + item * actions + a]
+            grad = scratch.critic_grads[item * pair + size + a] * constants.half[a]
+            scratch.actor_grads[out + item * actions + a] = grad * (np.float32(1.0) - squashed * squashed)
+    nets.backward(actor.sizes, actor.weights, actor.seeds, seed, scratch.actor_activations, scratch.actor_grads,
                   batch, scratch.actor_gradient, False)
     return loss / batch
 

@@ -1,4 +1,4 @@
-"""Random numbers as a function of a key and a position: streams that need no state and do not know of each other."""
+"""Random numbers as a function of a key and a position: independent streams that need no state."""
 
 from collections.abc import Sequence
 

@@ -2,7 +2,7 @@
 
 A library call costs as much as the product itself when matrices are 64 wide, and the libraries that come with
 torch and NumPy leave half of an AVX-512 machine idle. Matrices are blocks of flat arrays, given by offset and
-strides. The inner tile is written as vectors for LLVM, which turns them into what the machine has.
+strides. The inner tile is written as vectors for LLVM, which compiles them to the vector instructions of the machine.
 """
 
 from typing import Any
@@ -26,7 +26,7 @@ _INDEX, _FLOAT = ir.IntType(64), ir.FloatType()
 
 
 class _Matrix:
-    """Addresses of the elements of one flat array, in LLVM's words."""
+    """Addresses of the elements of one flat array, in LLVM's types."""
 
     def __init__(self, context: Any, builder: Any, array: Any, start: Any):
         self._builder = builder

@@ -1,10 +1,10 @@
-"""Laws of the streams: a number depends on its key and its place only, and has the distribution it should have."""
+"""Laws of the streams: a number depends on its key and its position only, and has the distribution it should have."""
 
 import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from pbcs_ompl.agents.streams import normal, stream_keys, uniform
+from pbcs_ompl.agents.kernels.counter_rng import normal, stream_keys, uniform
 
 
 @pytest.mark.parametrize("draw", [uniform, normal])

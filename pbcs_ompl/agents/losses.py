@@ -1,0 +1,170 @@
+"""The losses of all algorithms, as pure functions on autograd; and the targets that they are given.
+
+Every loss is a mean over the mini-batch, [S] for a stack of S seeds. Its first argument is what is trained; networks
+are functions of stacks of inputs [S, B, in], such as `Weights`. The tanh of an actor's outputs is an action in [-1, 1],
+called squashed here; an `ActionBox` scales it to an action.
+"""
+
+from collections.abc import Callable
+from math import log, pi
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn.functional import softplus
+
+Network = Callable[[Tensor], Tensor]
+"""Outputs [S, B, out] for inputs [S, B, in]."""
+
+LOG_STD = -20.0, 2.0
+"""Bounds of the log standard deviation of SAC's policy; outside of them its gradient is 0 (Haarnoja et al., 2018)."""
+
+
+class ActionBox(NamedTuple):
+    """The box of actions, from centre - half to centre + half."""
+
+    half: Tensor
+    """[A]"""
+    centre: Tensor
+    """[A]"""
+
+    def scale(self, squashed: Tensor) -> Tensor:
+        """Return the actions [S, B, A] for values in [-1, 1]."""
+        return torch.addcmul(self.centre, squashed, self.half)
+
+    def squash(self, actions: Tensor) -> Tensor:
+        """Return values in [-1, 1] for actions [S, B, A]."""
+        return (actions - self.centre) / self.half
+
+    def join(self, observations: Tensor, squashed: Tensor) -> Tensor:
+        """Return observations and scaled actions side by side [S, B, O + A], as a critic takes them."""
+        return torch.cat((observations, self.scale(squashed)), dim=2)
+
+
+def td_targets(rewards: Tensor, not_done: Tensor, next_values: Tensor, discount: float) -> Tensor:
+    """Return y = r + discount Q'(s', a') [S, B, 1], or r where the transition is terminal.
+
+    Source: [Matheron2020] Eq. 1.2 (Lillicrap et al., 2015).
+
+    Args:
+        rewards: r [S, B, 1].
+        not_done: 0 where the transition is terminal, else 1 [S, B, 1].
+        next_values: Q'(s', a') of the target networks [S, B, 1].
+        discount: In [0, 1).
+    """
+    return torch.addcmul(rewards, not_done, next_values, value=discount)
+
+
+def critic_loss(critic: Network, obs_actions: Tensor, targets: Tensor) -> Tensor:
+    """Return the mean of (Q(s, a) - y)^2 [S]; [Matheron2020] Eq. 1.2.
+
+    Args:
+        critic: Q.
+        obs_actions: s and a side by side [S, B, O + A].
+        targets: y [S, B, 1].
+    """
+    return (critic(obs_actions) - targets).square().mean(dim=(1, 2))
+
+
+def policy_loss(actor: Network, critic: Network, observations: Tensor, box: ActionBox) -> Tensor:
+    """Return the mean of -Q(s, pi(s)) [S]; its gradient is the deterministic policy gradient.
+
+    Source: [Matheron2020] Eqs. 1.3 and 1.5 (Silver et al., 2014).
+
+    Args:
+        actor: pi, before its tanh.
+        critic: Q.
+        observations: s [S, B, O].
+        box: Of the actions.
+    """
+    return -critic(box.join(observations, actor(observations).tanh())).mean(dim=(1, 2))
+
+
+def imitation_loss(actor: Network, observations: Tensor, squashed: Tensor) -> Tensor:
+    """Return the mean of |pi(s) - c|^2 [S], in half-widths of the action box; [Matheron2020] 6.6.2.
+
+    Args:
+        actor: pi, before its tanh.
+        observations: s [S, B, O].
+        squashed: The actions c to be imitated, in [-1, 1] [S, B, A].
+    """
+    return (actor(observations).tanh() - squashed).square().sum(dim=2).mean(dim=1)
+
+
+def improvement_loss(actor: Network, critic: Network, obs_actions: Tensor, targets: Tensor, box: ActionBox) -> Tensor:
+    """Return the mean of [y > Q(s, pi(s))] |pi(s) - a|^2 [S], in half-widths of the action box.
+
+    Source: [Matheron2020] Eq. 6.5 (CACLA, van Hasselt and Wiering, 2007).
+
+    Args:
+        actor: pi, before its tanh.
+        critic: Q.
+        obs_actions: s and a side by side [S, B, O + A].
+        targets: y [S, B, 1].
+        box: Of the actions.
+    """
+    size = obs_actions.shape[2] - len(box.half)
+    observations, taken = obs_actions[..., :size], box.squash(obs_actions[..., size:])
+    squashed = actor(observations).tanh()
+    better = targets > critic(box.join(observations, squashed.detach()))
+    return ((squashed - taken) * better).square().sum(dim=2).mean(dim=1)
+
+
+def sample_squashed(outputs: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:
+    """Return tanh(u) [S, B, A], u normal, and the logarithm of its density [S, B, 1].
+
+    Densities are measured in half-widths of the action box. Source: Haarnoja et al., 2018, appendix C.
+
+    Args:
+        outputs: Mean and log standard deviation of u side by side [S, B, 2 A].
+        noise: Standard normal numbers [S, B, A].
+    """
+    mean, log_std = outputs.chunk(2, dim=2)
+    log_std = log_std.clamp(*LOG_STD)
+    inner = torch.addcmul(mean, log_std.exp(), noise)
+    return inner.tanh(), squashed_log_density(inner, log_std, noise)
+
+
+def squashed_log_density(inner: Tensor, log_std: Tensor, noise: Tensor) -> Tensor:
+    """Return the logarithm of the density of tanh(u) [S, B, 1] for u = mean + exp(log_std) noise.
+
+    Args:
+        inner: u [S, B, A].
+        log_std: The logarithm of the standard deviation of u [S, B, A].
+        noise: Standard normal numbers [S, B, A].
+    """
+    # log(1 - tanh(u)^2), without its cancellation for large u.
+    log_squash = 2.0 * (log(2.0) - inner - softplus(-2.0 * inner))
+    return (-0.5 * noise.square() - log_std - 0.5 * log(2.0 * pi) - log_squash).sum(dim=2, keepdim=True)
+
+
+def soft_policy_loss(actor: Network, critics: Network, observations: Tensor, noise: Tensor, temperature: Tensor,
+                     box: ActionBox) -> tuple[Tensor, Tensor]:
+    """Return the mean of temperature log pi(a|s) - min_i Q_i(s, a) [S], a drawn from pi, and log pi(a|s) [S, B, 1].
+
+    Source: Haarnoja et al., 2018, Eq. 7 of "Soft actor-critic algorithms and applications".
+
+    Args:
+        actor: Mean and log standard deviation of pi before its tanh.
+        critics: Q_1 of all seeds, then Q_2, as one stack [2 S, B, 1].
+        observations: s [S, B, O].
+        noise: Standard normal numbers [S, B, A].
+        temperature: [S].
+        box: Of the actions.
+    """
+    squashed, log_density = sample_squashed(actor(observations), noise)
+    values = torch.minimum(*critics(box.join(observations, squashed).repeat(2, 1, 1)).chunk(2))
+    return (temperature[:, None, None] * log_density - values).mean(dim=(1, 2)), log_density
+
+
+def temperature_loss(log_temperature: Tensor, log_density: Tensor, target_entropy: float) -> Tensor:
+    """Return -log temperature (log pi(a|s) + target entropy), a mean over the mini-batch [S].
+
+    Source: Haarnoja et al., 2018, Eq. 18 of "Soft actor-critic algorithms and applications", for the logarithm.
+
+    Args:
+        log_temperature: [S].
+        log_density: log pi(a|s) [S, B, 1].
+        target_entropy: The entropy that the policy should have.
+    """
+    return -log_temperature * (log_density.mean(dim=(1, 2)) + target_entropy)
