@@ -27,12 +27,12 @@ class Emptiest(Strategy):
     def __init__(self, candidates: int = 10):
         self.candidates = candidates
 
-    def start(self, space, rng):
-        super().start(space, rng)
+    def start(self, context, rng):
+        super().start(context, rng)
         self.bins, self.expansions = [], Counter()  # the bin of each node, the expansions of each bin
 
     def inserted(self, tree, first, last):
-        self.bins += map(tuple, np.floor(tree.features[first:last] / self.space.bin_size).tolist())
+        self.bins += map(tuple, np.floor(tree.features[first:last] / self.context.bin_size).tolist())
 
     def select(self, tree, count):
         return np.array([self.select_one(tree) for _ in range(count)])

@@ -15,7 +15,7 @@ WALL_X, GAP_Y = 0.0, 0.5  # a wall at x = 0 that leaves a gap above y = 0.5
 
 
 def propagate(state, control, duration, result):
-    """Kinematic car: speed and steering angle are held for `duration` seconds."""
+    """Kinematic car: speed and steering angle are constant for `duration` seconds."""
     x, y, yaw = state.getX(), state.getY(), state.getYaw()
     speed, steering = control[0], control[1]
     result.setX(x + speed * duration * cos(yaw))
@@ -61,7 +61,7 @@ def make_setup():
 def main(seconds: float = 20.0) -> bool:
     ou.setLogLevel(ou.LOG_ERROR)
     setup = make_setup()
-    setup.setPlanner(Ex(setup.getSpaceInformation(), seed=1))
+    setup.setPlanner(Ex.build(setup.getSpaceInformation(), seed=1))
     setup.solve(seconds)
     solved = setup.haveExactSolutionPath()
     if solved:

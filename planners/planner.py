@@ -96,7 +96,7 @@ class Strategy(ABC):
                            options={**cls.options(), **options})
 
 
-class TreePlanner(ob.Planner):
+class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no types
     """Selects nodes, propagates them, keeps what follows, until a node is in the goal.
 
     It works on any `ompl.control.SpaceInformation`. After `use_model` it propagates through the environment itself,

@@ -48,7 +48,7 @@ class RRTNH(Strategy):
         if self._size + last - first > len(self._items):
             self._items = np.resize(self._items, max(self._size + last - first, 3 * len(self._items) // 2))
         features = tree.columns.features
-        for node in first + np.flatnonzero(~tree.terminal[first:last]):
+        for node in (first + np.flatnonzero(~tree.terminal[first:last])).tolist():
             self._size = nearest.insert(features, self._items, self._size, node)
 
     def draw_targets(self, count: int) -> np.ndarray:

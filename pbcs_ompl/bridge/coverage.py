@@ -10,7 +10,7 @@ from numba import njit
 
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.tree import Tree
-from pbcs_ompl.core.types import Array, Counter, IndexArray
+from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
 
 Step = Callable[[list[float], list[float]], list[float]]
 POINTS_PER_DECADE = 10
@@ -118,7 +118,7 @@ def _cells_per_axis(model: ResettableModel, edges: Array) -> IndexArray:
 
 @njit(cache=True)
 def _count_cells(states: Array, columns: IndexArray, low: Array, edges: Array, shape: IndexArray,
-                 points: IndexArray, seen: Array) -> IndexArray:
+                 points: IndexArray, seen: BoolArray) -> IndexArray:
     """Return how many cells the first `points` [K] rows of states [N, D] lie in [K], by the dimensions `columns` [F].
 
     Args:

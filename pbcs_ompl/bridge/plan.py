@@ -11,8 +11,8 @@ import gymnasium
 from ompl import base as ob
 
 from pbcs_ompl.bridge.coverage import Coverage, TransitionRecorder
-from pbcs_ompl.bridge.planner_spec import PlannerSpec
-from pbcs_ompl.bridge.problem import Problem, make_problem
+from pbcs_ompl.bridge.planner_spec import PlannerSpec, as_batch_planner
+from pbcs_ompl.bridge.problem import CallbackState, Problem, make_problem
 from pbcs_ompl.bridge.termination import Limits, checked_limits, interruptible, make_stop
 from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory
 from pbcs_ompl.bridge.tree import save_tree, tree_of
@@ -146,10 +146,11 @@ class _Found(NamedTuple):
 
 def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
             on_progress: ProgressCallback | None) -> _Found:
-    setup, model, callbacks = problem.setup, problem.model, problem.callbacks
+    setup, callbacks = problem.setup, problem.callbacks
     planner = spec.build(problem.space_information, SeedTree(seed).child("planner").integer())
-    if isinstance(planner, BatchPlanner):
-        planner.use_model(model, callbacks.counter)
+    batch_planner = as_batch_planner(planner)
+    if batch_planner is not None:
+        batch_planner.use_model(problem.model, callbacks.counter)
     setup.setPlanner(planner)
     setup.setup()
     stop = make_stop(callbacks, limits.max_seconds, on_progress)
@@ -164,11 +165,18 @@ def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
         except Exception as error:
             raise callback_failed(error) from error
         seconds = time.perf_counter() - began
-    if isinstance(planner, BatchPlanner) and planner.error is not None:
-        callbacks.fail(planner.error)
+    if batch_planner is not None:
+        _keep_error(batch_planner, callbacks)
     callbacks.raise_error()
     tree = tree_of(planner, problem.space_information)
     return _Found(_solution(problem, spec, seed), tree, spec.settings(planner), seconds)
+
+
+def _keep_error(planner: BatchPlanner, callbacks: CallbackState) -> None:
+    """Pass on the planner's error, without a variable in the frame that raises it: the two would keep each other."""
+    error = planner.error
+    if error is not None:
+        callbacks.fail(error)
 
 
 def _solution(problem: Problem, spec: PlannerSpec, seed: int) -> Trajectory | None:

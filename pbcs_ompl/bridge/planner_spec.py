@@ -1,6 +1,7 @@
 """From a planner's name, class or factory to an OMPL planner on a problem."""
 
 import inspect
+from collections.abc import Callable
 from typing import Any
 
 from ompl import base as ob
@@ -35,7 +36,8 @@ class PlannerSpec:
         self.name = planner if isinstance(planner, str) else _name_of(planner)
         self.options = dict(options)
         if isinstance(source, PlannerFactory):
-            self._build, self._seeded, self._defaults = source.build, True, source.options()
+            self._build: Callable[..., Any] = source.build
+            self._seeded, self._defaults = True, source.options()
             check_names(f"planner {self.name!r}", "option", options, self._defaults)
         elif inspect.isclass(source) and issubclass(source, ob.Planner):
             parameters = _parameters(source)
@@ -70,8 +72,14 @@ class PlannerSpec:
 
         Options that OMPL or the planner decides about and does not report are left out.
         """
-        values = planner.settings if isinstance(planner, BatchPlanner) else {**self._defaults, **self.options}
+        ours = as_batch_planner(planner)
+        values = {**self._defaults, **self.options} if ours is None else ours.settings
         return {name: value for name, value in values.items() if value is not None}
+
+
+def as_batch_planner(planner: Any) -> BatchPlanner | None:
+    """Return an OMPL planner if it can propagate batches, else None."""
+    return planner if isinstance(planner, BatchPlanner) else None
 
 
 def _name_of(source: Any) -> str:

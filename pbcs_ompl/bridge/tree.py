@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from ompl import base as ob
 
+from pbcs_ompl.bridge.planner_spec import as_batch_planner
 from pbcs_ompl.core.errors import DamagedFile
-from pbcs_ompl.core.interfaces import BatchPlanner
 from pbcs_ompl.core.ompl_access import real_dimension, value_reader
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.results.folder import read_arrays, write_arrays
@@ -19,8 +19,9 @@ def tree_of(planner: Any, space_information: Any) -> Tree:
 
     PlannerData carry no controls in the installed OMPL, and KPIECE1 keeps only some of the states it visited.
     """
-    if isinstance(planner, BatchPlanner) and planner.tree is not None:
-        return planner.tree
+    ours = as_batch_planner(planner)
+    if ours is not None and ours.tree is not None:
+        return ours.tree
     data = ob.PlannerData(space_information)
     planner.getPlannerData(data)
     read = value_reader(space_information.getStateSpace())

@@ -85,7 +85,7 @@ class Tree:
     @property
     def has_controls(self) -> bool:
         """Whether the planner reports its controls."""
-        return self.columns.controls.shape[1] > 0
+        return bool(self.columns.controls.shape[1] > 0)
 
     @property
     def parents(self) -> NDArray[np.int32]:

@@ -1,8 +1,11 @@
 """An exploration tree, coloured by depth, with the path that was found ([Matheron2020] Figs. 4.2 and 4.3)."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, IndexArray
@@ -12,7 +15,7 @@ from pbcs_ompl.figures.maze import draw_line, legend_below, plane, stage
 MOST_EDGES = 100_000
 
 
-def tree_figure(model: ResettableModel, states: Array, parents: IndexArray, *, path: Array | None = None,
+def tree_figure(model: ResettableModel, states: Array, parents: NDArray[np.integer[Any]], *, path: Array | None = None,
                 title: str = "") -> Figure:
     """Draw a tree of states [N, D] with parents [N] (a root's parent is -1), and a path [T+1, D] in red.
 
@@ -37,7 +40,7 @@ def tree_figure(model: ResettableModel, states: Array, parents: IndexArray, *, p
     return figure
 
 
-def depth(parents: IndexArray) -> IndexArray:
+def depth(parents: NDArray[np.integer[Any]]) -> IndexArray:
     """Return the depth [N] of each node below its root, by doubling: every round jumps twice as far."""
     ancestors = np.where(parents < 0, np.arange(len(parents)), parents)
     depths = (parents >= 0).astype(np.int64)

@@ -13,12 +13,11 @@ from numba import njit, types
 from numpy.typing import NDArray
 
 from pbcs_ompl.core.tree import GROWTH, resized_copy
-from pbcs_ompl.planners.kernels.runs import LENGTH, LOWEST, MEMBER, SIZE, START, append, choose
+from pbcs_ompl.planners.kernels.runs import LENGTH, LOWEST, MEMBER, SIZE, START, Number, append, choose
 
 SMALLEST = 2  # log2 of the rows of a new bin's slice
 CLASSES = 32  # slice sizes 2**0 .. 2**31
 FARTHEST = 4.6e18  # cells beyond this coordinate are one cell: int64 ends there
-Number = int | np.int64
 
 
 class BinQueue(NamedTuple):
@@ -124,7 +123,7 @@ def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[
 
 
 @njit(cache=True, inline="always")
-def add(pool: NDArray[np.int32], heads: NDArray[np.int32], number: int, node: int) -> bool:
+def add(pool: NDArray[np.int32], heads: NDArray[np.int32], number: Number, node: Number) -> bool:
     """Add a node of count 0 to a bin; return False where the bin is full, or there is none (number -1)."""
     if number < 0 or heads[number, LENGTH] == 1 << heads[number, SIZE]:
         return False
@@ -133,9 +132,9 @@ def add(pool: NDArray[np.int32], heads: NDArray[np.int32], number: int, node: in
 
 
 @njit(cache=True)
-def make_room_and_add(queue: BinQueue, cell: NDArray[np.int64], place: int, node: int) -> bool:
+def make_room_and_add(queue: BinQueue, cell: NDArray[np.int64], place: Number, node: Number) -> bool:
     """Add a node where `add` could not: open its bin, or double it. Return False where an array is full."""
-    number = np.int64(queue.table[place]) - 1
+    number: Number = np.int64(queue.table[place]) - 1
     if number < 0:
         number = _new_bin(queue, cell, place)
         if number < 0:
@@ -163,7 +162,7 @@ def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.boo
 
 
 @njit(cache=True)
-def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: int) -> Number:
+def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: Number) -> Number:
     """Open a bin at a place of the hash table; return -1 if there is no room for one."""
     number = np.int64(queue.head[0, LENGTH])
     if number == len(queue.heads):
@@ -181,7 +180,7 @@ def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: int) -> Number:
 
 
 @njit(cache=True)
-def _double(queue: BinQueue, number: int) -> bool:
+def _double(queue: BinQueue, number: Number) -> bool:
     """Move a full bin to a slice of twice the size; return whether there was room."""
     pool, heads, free = queue.pool, queue.heads, queue.free
     start, length, size = heads[number, START], heads[number, LENGTH], np.int64(heads[number, SIZE])
@@ -198,9 +197,9 @@ def _double(queue: BinQueue, number: int) -> bool:
 
 
 @njit(cache=True)
-def _take(pool: NDArray[np.int32], free: NDArray[np.int32], used: NDArray[np.int64], size: int) -> Number:
+def _take(pool: NDArray[np.int32], free: NDArray[np.int32], used: NDArray[np.int64], size: Number) -> Number:
     """Return the first row of a slice of 2**size rows, or -1."""
-    start = np.int64(free[size])
+    start: Number = np.int64(free[size])
     if start >= 0:
         free[size] = pool[start, MEMBER]
         return start

@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from llvmlite import ir  # type: ignore[import-untyped]
+from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
@@ -24,7 +24,7 @@ COLUMNS_TYPE = types.NamedTuple(
 """Numba's type of `pbcs_ompl.core.tree.Columns`."""
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def prefetch(typing_context: Any, array: Any, row: Any) -> Any:
     """Fetch the first cache line of array[row] of a two-dimensional array into the cache; changes no value."""
     signature = types.void(array, types.intp)

@@ -7,6 +7,8 @@ of the lowest run is one random number away, and raising a member is one swap wi
 then is the end of the run before.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -14,10 +16,11 @@ from numpy.typing import NDArray
 MEMBER, COUNT, RUN = 0, 1, 2  # columns of `entries`
 START, LENGTH, LOWEST, SIZE = 0, 1, 2, 3  # columns of `heads`; SIZE (log2 of the room) is for the owner
 Rows = NDArray[np.int32]
+Number = int | np.integer[Any]
 
 
 @njit(cache=True, inline="always")
-def append(entries: Rows, heads: Rows, queue: int, member: int) -> None:
+def append(entries: Rows, heads: Rows, queue: Number, member: Number) -> None:
     """Write a member of count 0 behind those of the queue heads[queue]; there must be room."""
     length = heads[queue, LENGTH]
     row = heads[queue, START] + length
@@ -32,7 +35,7 @@ def append(entries: Rows, heads: Rows, queue: int, member: int) -> None:
 
 
 @njit(cache=True, inline="always")
-def choose(entries: Rows, heads: Rows, queue: int, uniform: float) -> int:
+def choose(entries: Rows, heads: Rows, queue: Number, uniform: float) -> Number:
     """Return a random member of the lowest run, by a number uniform in [0, 1), and raise its count by one.
 
     Equals "remove it from the list of its count, append it to the list of the next" of [Matheron2020] Alg. 5,
@@ -41,7 +44,7 @@ def choose(entries: Rows, heads: Rows, queue: int, uniform: float) -> int:
     length, first = heads[queue, LENGTH], heads[queue, LOWEST]
     head = heads[queue, START] + first
     chosen = head + int(uniform * (length - first))
-    member = entries[chosen, MEMBER]
+    member: Number = entries[chosen, MEMBER]
     count = entries[head, COUNT] + 1
     entries[chosen, MEMBER] = entries[head, MEMBER]
     run = first
@@ -55,7 +58,8 @@ def choose(entries: Rows, heads: Rows, queue: int, uniform: float) -> int:
 
 
 @njit(cache=True, inline="always")
-def peek(heads: Rows, queue: int, uniform: float) -> int:
+def peek(heads: Rows, queue: Number, uniform: float) -> Number:
     """Return the row of the member that `choose` would return."""
     length, first = heads[queue, LENGTH], heads[queue, LOWEST]
-    return heads[queue, START] + first + int(uniform * (length - first))
+    row: Number = heads[queue, START] + first + int(uniform * (length - first))
+    return row

@@ -14,7 +14,7 @@ import numpy as np
 
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.types import Array, Transition
-from pbcs_ompl.planners import Ex
+from pbcs_ompl.planners import Ex, PlanningContext
 from pbcs_ompl.resettable import make
 
 SLICES = 4
@@ -53,19 +53,19 @@ def python_loop(steps: int, seed: int) -> float:
 
 def ex(steps: int, seed: int) -> tuple[float, Stopwatch, float, int]:
     """Return the seconds of Ex's search, the time inside transitions, bytes a node, and the transitions made."""
-    planners = []
+    strategies = []
 
     class Watched(Ex):
-        def use_model(self, model: Any, counter: Any) -> None:
-            planners.append(self)
-            super().use_model(model, counter)
+        def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
+            strategies.append(self)
+            super().start(context, rng)
 
     model: Any = make("pbcs/AntMaze-v0")
     model.transition(np.tile(model.initial_state(0), (4, 1)), np.zeros((4, 8)))  # wake the threads
     watch = Stopwatch(model)
     result = plan(model, Watched, seed=seed, max_transitions=steps)
-    (planner,) = planners
-    size = (planner.tree.nbytes + planner.strategy.nbytes) / len(planner.tree)
+    (strategy,) = strategies
+    size = (result.tree.nbytes + strategy.nbytes) / len(result.tree)
     return result.seconds, watch, size, result.transitions
 
 

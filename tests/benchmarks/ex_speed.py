@@ -2,17 +2,14 @@
 
     python tests/benchmarks/ex_speed.py [--quick]
 
-1. Propagations per second on a 15x15 maze: Ex through `plan`, OMPL's KPIECE1 through `plan`, and KPIECE1 on a
-plain
+1. Propagations per second on a 15x15 maze: Ex through `plan`, OMPL's KPIECE1 through `plan`, and KPIECE1 on a plain
    OMPL problem with the leanest Python propagator and no validity callback. Bar: 7 times the faster KPIECE1.
-2. Ex's rate near 1e5, 1e6 and 1e7 nodes on a 15x15 maze whose goal is walled in (bar: within 25 %), and bytes
-a node
+2. Ex's rate near 1e5, 1e6 and 1e7 nodes on a 15x15 maze whose goal is walled in (bar: within 25 %), and bytes a node
    (bar: 110).
-3. Ten 9x9 mazes: median wall time to the first solution of Ex and of OMPL's planners. These get the plain
-problem, and
-   the goal as a GoalState, so that those with a goal bias know where it is. Bar: 1/50 of the fastest at
-   OMPL's default projection (cells of 1/20 of the extent). Beside it, OMPL's planners with projection cells
-   as small as Ex's bins, which they profit from.
+3. Ten 9x9 mazes: median wall time to the first solution of Ex and of OMPL's planners. These get the plain problem, and
+   the goal as a GoalState, so that those with a goal bias know where it is. Bar: 1/50 of the fastest at OMPL's default
+   projection (cells of 1/20 of the extent). Beside it, OMPL's planners with projection cells as small as Ex's bins, which
+   they profit from.
 """
 
 import argparse
@@ -118,7 +115,7 @@ def growing_tree(size: int, nodes: list[int]) -> None:
     counter, rates = Counter(nodes[-1]), {}
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with make_problem(model, counter=counter) as problem:
-        planner = Ex(problem.space_information)
+        planner = Ex.build(problem.space_information)
         planner.use_model(model, counter)
         problem.setup.setPlanner(planner)
         problem.setup.setup()

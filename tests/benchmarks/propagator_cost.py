@@ -3,7 +3,7 @@
     python tests/benchmarks/propagator_cost.py
 
 The loop and OMPL's call are included; `step_one` alone and an empty Python propagator are measured beside
-it in the same run, so that the share of the bridge can be told from that of the environment.
+it in the same run, so that the share of the bridge can be separated from that of the environment.
 """
 
 import time
@@ -12,9 +12,9 @@ from typing import Any
 
 from ompl import control as oc
 
-from pbcs_ompl.bridge.layout import blocks, state_writer
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.bridge.problem import make_problem
+from pbcs_ompl.core.ompl_access import value_writer
 from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
 
@@ -31,7 +31,7 @@ def main() -> None:
         with make_problem(model, counter=Counter()) as problem:
             information = problem.space_information
             states, control = (information.allocState(), information.allocState()), information.allocControl()
-            state_writer(blocks(len(start), model.feature_dims))(states[0], start)
+            value_writer(information.getStateSpace())(states[0], start)
             control[0] = control[1] = 0.05
             bridge = microseconds(lambda: information.propagate(states[0], control, 1, states[1]))  # noqa: B023
             information.setStatePropagator(lambda *_: None)
