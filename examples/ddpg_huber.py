@@ -55,4 +55,4 @@ class DDPGHuber(StackedAgent):
 
 if __name__ == "__main__":
     result = pbcs_ompl.train("pbcs/Maze-v0", env_kwargs={"size": 2}, agent="ddpg_huber:DDPGHuber")
-    print(f"solved: {result.solved}, {len(result.chain.skills)} skills, {result.updates:,} updates")
+    print(f"solved: {result.solved}, {result.updates:,} updates")

@@ -120,9 +120,10 @@ class OrnsteinUhlenbeck:
 
     def apply(self, actions: Array, draws: Array, starts: BoolArray, low: Array, high: Array) -> Array:
         """Move x by one step and add it; the sum is clipped to the box."""
-        before = 0.0 if self._x is None else np.where(starts[..., None], 0.0, self._x)
-        self._x = before * (1.0 - self.theta * self.dt) + self.sigma * np.sqrt(self.dt) * draws
-        return np.clip(actions + self._x * (high - low) / 2.0, low, high)
+        before: Array | float = 0.0 if self._x is None else np.where(starts[..., None], 0.0, self._x)
+        x: Array = before * (1.0 - self.theta * self.dt) + self.sigma * np.sqrt(self.dt) * draws
+        self._x = x
+        return np.clip(actions + x * (high - low) / 2.0, low, high)
 
 
 NOISES: dict[str, Callable[..., Noise]] = {

@@ -38,7 +38,7 @@ class Policy:
     @property
     def observation_size(self) -> int:
         """Length O of an observation."""
-        return self.layers[0][0].shape[0]
+        return int(self.layers[0][0].shape[0])
 
     @cached_property
     def _plain(self) -> tuple[tuple[int, ...], Float32Array] | None:

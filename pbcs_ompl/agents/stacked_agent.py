@@ -85,7 +85,7 @@ class StackedAgent(ABC):
         if not self.seeds or observation_size < 1:
             raise InvalidOption(f"{len(self.seeds)} seeds and {observation_size} observations, expected some")
         self.device = choose_device(device)
-        self.compile = compile
+        self.compile: Compile = compile
         self.num_updates = 0
         self.box = ActionBox(self.tensor((self.action_high - self.action_low) / 2.0),
                              self.tensor((self.action_high + self.action_low) / 2.0))
@@ -106,13 +106,12 @@ class StackedAgent(ABC):
         return {"actor": self.actor, "critic": self.critic}
 
     @abstractmethod
-    def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor, /, *inputs: Any) -> dict[str, Tensor]:
-        """Make one update of all networks.
+    def update(self, *arguments: Any, **_: Any) -> dict[str, Tensor]:
+        """Make one update of all networks: update(batch, critic_rate, actor_rate, ...).
 
         Args:
-            batch: Mini-batches [S, B, ...].
-            critic_rate, actor_rate: Of this step of Adam, for `minimise`.
-            inputs: What else `update_inputs` returns.
+            arguments: A `Batch` [S, B, ...], then one item of `update_inputs`, which begins with the rates of this
+                step of Adam.
 
         Returns:
             The losses [S] by name.

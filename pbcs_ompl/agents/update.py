@@ -62,13 +62,16 @@ class _CompiledOrNot:
 
     def __init__(self, function: Callable[..., Any], record: bool):
         self._plain = function
+        from torch._dynamo.exc import TorchDynamoException  # takes a second to import
+
+        self._failure = TorchDynamoException
         chosen: Callable[..., Any] = torch.compile(function, fullgraph=True, dynamic=False)
         self._chosen = _trace_autograd(chosen) if record else chosen
 
     def __call__(self, *arguments: Any) -> Any:
         try:
             return self._chosen(*arguments)
-        except torch._dynamo.exc.TorchDynamoException as error:
+        except self._failure as error:
             if self._chosen is self._plain:
                 raise
             reason = str(error).strip().partition("\n")[0]
@@ -80,9 +83,11 @@ class _CompiledOrNot:
 
 def _trace_autograd(function: Callable[..., Any]) -> Callable[..., Any]:
     """Let torch's compiler trace the gradients of losses; versions that cannot do it refuse to compile them."""
-    if "trace_autograd_ops" not in torch._dynamo.config.get_config_copy():
+    from torch._dynamo import config
+
+    if "trace_autograd_ops" not in config.get_config_copy():
         return function
-    traced: Callable[..., Any] = torch._dynamo.config.patch(trace_autograd_ops=True)(function)
+    traced: Callable[..., Any] = config.patch(trace_autograd_ops=True)(function)
     return traced
 
 

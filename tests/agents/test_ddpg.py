@@ -1,4 +1,4 @@
-"""DDPG: its losses from their equations, every way of running it, saving, learning; see tests/contracts/ for the rest."""
+"""DDPG: its losses from their equations, every way of running it, saving, learning; see also tests/contracts/."""
 
 import numpy as np
 import pytest

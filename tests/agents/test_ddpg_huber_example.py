@@ -31,10 +31,8 @@ def filled(kind: type[StackedAgent], *seeds: int, scale: float = 1.0, **settings
 
 
 def test_a_wide_quadratic_region_makes_it_ddpg_with_half_the_loss(kind) -> None:
-    class Reference(DDPG):
-        gradients = {}
-
-    mine, ddpg = filled(kind, 1, 2, huber_delta=1e9), filled(Reference, 1, 2)
+    reference = type("Reference", (DDPG,), {"gradients": {}})
+    mine, ddpg = filled(kind, 1, 2, huber_delta=1e9), filled(reference, 1, 2)
     halved, whole = mine.train(1), ddpg.train(1)
     np.testing.assert_allclose(2.0 * halved["critic_loss"], whole["critic_loss"], rtol=1e-5)
     np.testing.assert_allclose(halved["actor_loss"], whole["actor_loss"], rtol=1e-3, atol=1e-5)
@@ -58,7 +56,7 @@ def test_outliers_change_it_less_than_ddpg(kind) -> None:
 
 def test_hand_written_gradients_refuse_a_loss_that_they_do_not_have(kind) -> None:
     wrong = type("Wrong", (kind,), {"gradients": GRADIENTS})
-    with pytest.raises(InvalidOption, match="Wrong.gradients has no gradient of the loss 'huber_critic_loss'"):
+    with pytest.raises(InvalidOption, match=r"Wrong\.gradients has no gradient of the loss 'huber_critic_loss'"):
         filled(wrong, 1).train(1)
     with pytest.raises(InvalidOption, match="huber_delta"):
         kind.settings_type.from_preset("thesis", huber_delta=0.0)
@@ -66,7 +64,8 @@ def test_hand_written_gradients_refuse_a_loss_that_they_do_not_have(kind) -> Non
 
 def test_it_trains_from_the_command_line(kind, tmp_path, capsys) -> None:
     code = main(["train", "--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 2}', "--agent",
-                 "examples.ddpg_huber:DDPGHuber", "--max-transitions", "12000", "--json", "--out", str(tmp_path / "run")])
+                 "examples.ddpg_huber:DDPGHuber", "--max-transitions", "12000", "--json",
+                 "--out", str(tmp_path / "run")])
     result = json.loads(capsys.readouterr().out.strip().splitlines()[-1])
     assert code == 1
     assert not result["solved"]

@@ -1,6 +1,6 @@
 """Time one gradient step of DDPG, TD3 and SAC, ours against stable-baselines3's, in one run.
 
-    python tests/benchmarks/gradient_step.py [--update auto|eager|compiled] [--rounds 9]
+    python tests/benchmarks/gradient_step.py [--update auto|eager|compiled|autograd] [--rounds 9]
 
 Both update actor, critics and targets from a full replay buffer with the same networks, mini-batches of 100,
 and learning rates; both train SAC's temperature. Ratios of medians are what counts; rounds alternate, so that both see
@@ -23,7 +23,7 @@ from pbcs_ompl.agents import DDPG, SAC, TD3, StackedAgent
 from pbcs_ompl.agents.update import Compile
 
 OBSERVATIONS, ACTIONS, FILL, BATCH = 2, 2, 20_000, 100
-COMPILE: dict[str, Compile] = {"auto": "auto", "eager": False, "compiled": True}
+COMPILE: dict[str, Compile] = {"auto": "auto", "eager": False, "compiled": True, "autograd": False}
 BARS = {(64, 64): 6.0, (256, 256): 2.0, (400, 300): 2.0}
 ALGORITHMS: dict[str, type[StackedAgent]] = {"DDPG": DDPG, "TD3": TD3, "SAC": SAC}
 
@@ -45,10 +45,12 @@ def transitions(count: int) -> tuple[np.ndarray, ...]:
             rng.random(count) < 0.05)
 
 
-def ours(name: str, hidden: tuple[int, ...], seeds: int, compile: Compile) -> Callable[[int], object]:
+def ours(name: str, hidden: tuple[int, ...], seeds: int, update: str) -> Callable[[int], object]:
     kind = ALGORITHMS[name]
+    if update == "autograd":
+        kind = type(name, (kind,), {"gradients": {}})
     agent = kind(OBSERVATIONS, [-1.0] * ACTIONS, [1.0] * ACTIONS, settings=kind.settings_type(hidden=hidden),
-                 seeds=range(seeds), compile=compile)
+                 seeds=range(seeds), compile=COMPILE[update])
     agent.add_transitions(*(np.stack([field] * seeds) for field in transitions(FILL)))
     return agent.train
 
@@ -77,18 +79,19 @@ def microseconds(rows: list[tuple[Callable[[int], object], int, int]], rounds: i
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--update", choices=COMPILE, default="auto", help="how our update runs")
+    parser.add_argument("--update", choices=COMPILE, default="auto",
+                        help="how our update runs; autograd: without hand-written gradients")
     parser.add_argument("--rounds", type=int, default=9)
     options = parser.parse_args()
     for hidden, bar in BARS.items():
         count = 200 if max(hidden) <= 64 else 40
-        rows = [(ours("DDPG", hidden, 1, COMPILE[options.update]), count, 1), (theirs("DDPG", hidden), count, 1)]
+        rows = [(ours("DDPG", hidden, 1, options.update), count, 1), (theirs("DDPG", hidden), count, 1)]
         mine, other = microseconds(rows, options.rounds)
         print(f"DDPG, {hidden}, one thread: {mine:.0f} us, stable-baselines3 {other:.0f} us: "
               f"{other / mine:.1f} times faster (bar {bar:g})", flush=True)
     for name in ALGORITHMS:
-        rows = [(ours(name, (64, 64), 1, COMPILE[options.update]), 40, 1),
-                (ours(name, (64, 64), 32, COMPILE[options.update]), 20, 2), (theirs(name, (64, 64)), 40, 1)]
+        rows = [(ours(name, (64, 64), 1, options.update), 40, 1),
+                (ours(name, (64, 64), 32, options.update), 20, 2), (theirs(name, (64, 64)), 40, 1)]
         mine, stack, other = microseconds(rows, options.rounds)
         print(f"{name}, (64, 64): stable-baselines3, one thread, {other:.0f} us; one seed, one thread {mine:.0f} us: "
               f"{other / mine:.1f} times faster; 32 seeds, two threads, {stack / 32:.0f} us a seed: "

@@ -1,4 +1,4 @@
-"""Each diagnostic on functions whose answer is known."""
+"""Each diagnostic on functions with a known result."""
 
 import numpy as np
 import pytest
@@ -42,13 +42,13 @@ def test_largest_actions_and_values():
 
 @settings(max_examples=30)
 @given(st.lists(st.floats(-5, 5), min_size=2, max_size=2), st.integers(0, 10**6))
-def test_the_slope_of_a_plane_is_exact_also_at_the_ends_of_the_box(weights, seed):
+def test_the_gradient_of_a_plane_is_exact_also_at_the_ends_of_the_box(weights, seed):
     low, high = np.array([-1.0, 0.0]), np.array([1.0, 4.0])
     actions = np.random.default_rng(seed).uniform(low, high, (2, 7, 2))
     actions[0, :2] = low, high
     value = lambda observations, actions: actions @ weights  # noqa: E731
-    slope = d.action_slope(value, np.zeros((2, 7, 3)), actions, low, high)
-    np.testing.assert_allclose(slope, np.broadcast_to(weights * (high - low) / 2.0, slope.shape), atol=1e-9)
+    gradient = d.action_gradient(value, np.zeros((2, 7, 3)), actions, low, high)
+    np.testing.assert_allclose(gradient, np.broadcast_to(weights * (high - low) / 2.0, gradient.shape), atol=1e-9)
 
 
 def test_slices_follow_one_dimension():
@@ -64,7 +64,7 @@ def test_a_step_function_is_flat_and_a_plane_is_not():
     assert d.flat_share(slanted, STATES, ACTIONS, LOW, HIGH) == 0.0
 
 
-def test_the_deadlock_of_theorem_1_is_found_where_the_reward_is_within_reach():
+def test_the_deadlock_of_theorem_1_is_found_where_one_step_is_rewarded():
     """Of 50 states, those below 0.1 have a rewarded action; the actor of Eq. 6.3 is stuck in all of them."""
     index = d.deadlock_index(constant(0.1), theorem_1, STATES, LOW, HIGH)
     assert index == (STATES < 0.1).mean()
@@ -75,7 +75,7 @@ def test_a_solved_problem_is_no_deadlock():
     assert d.deadlock_index(constant(-0.1), theorem_1, near, LOW, HIGH) == 0.0
 
 
-def test_a_slope_towards_better_actions_is_no_deadlock_but_a_local_maximum_at_the_end_is():
+def test_a_gradient_towards_better_actions_is_no_deadlock_but_a_local_maximum_at_the_end_is():
     assert d.deadlock_index(constant(0.1), slanted, STATES, LOW, HIGH) == 0.0
     valley = lambda observations, actions: np.abs(actions[..., 0] - 0.05) * np.where(actions[..., 0] < 0.05, 2, 1)  # noqa: E731
     assert d.deadlock_index(constant(0.1), valley, STATES, LOW, HIGH) == 1.0

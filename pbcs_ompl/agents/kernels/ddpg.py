@@ -120,7 +120,8 @@ def _critic_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, c
         scratch.critic_grads[out + item] = error * np.float32(2.0 / batch)
     nets.backward(critic.sizes, critic.weights, critic.seeds, seed, activations, scratch.critic_grads, batch,
                   scratch.critic_gradient, False)
-    return loss / batch
+    mean: float = loss / batch
+    return mean
 
 
 @njit(cache=True)
@@ -144,7 +145,8 @@ def _actor_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, co
             scratch.actor_grads[out + item * actions + a] = grad * (np.float32(1.0) - squashed * squashed)
     nets.backward(actor.sizes, actor.weights, actor.seeds, seed, scratch.actor_activations, scratch.actor_grads,
                   batch, scratch.actor_gradient, False)
-    return loss / batch
+    mean: float = loss / batch
+    return mean
 
 
 update_one = njit(cache=True)(_update)

@@ -7,7 +7,7 @@ strides. The inner tile is written as vectors for LLVM, which compiles them to t
 
 from typing import Any
 
-import llvmlite.binding  # type: ignore[import-untyped]
+import llvmlite.binding
 import numpy as np
 from llvmlite import ir
 from numba import njit, types

@@ -135,7 +135,7 @@ def _adam(weights: np.ndarray, mean: np.ndarray, square: np.ndarray, gradient: n
 
 @njit(cache=True, fastmath=FAST)
 def polyak_update(sizes: Sizes, weights: np.ndarray, target: np.ndarray, seeds: int, seed: int,
-           tau: float) -> None:
+           tau: np.float32) -> None:
     """Move one seed's target: target <- target + tau (weights - target)."""
     for layer in range(len(sizes) - 1):
         fan_out = sizes[layer + 1]
