@@ -1,4 +1,4 @@
-"""How do I write an algorithm of my own? DDPG whose critic minimises the Huber loss instead of the squared error.
+"""How do I write my own algorithm? DDPG whose critic minimises the Huber loss instead of the squared error.
 
     python examples/ddpg_huber.py
     pbcs train --env pbcs/Maze-v0 --env-kwargs '{"size": 2}' --agent examples.ddpg_huber:DDPGHuber

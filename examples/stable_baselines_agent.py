@@ -1,9 +1,9 @@
-"""How do I train skills with somebody else's agent? Here with TD3 of stable-baselines3.
+"""How do I train skills with an agent of another library? Here with TD3 of stable-baselines3.
 
     python examples/stable_baselines_agent.py
     pbcs train --env pbcs/Maze-v0 --env-kwargs '{"size": 2}' --agent examples.stable_baselines_agent:StableTD3
 
-A name of its own comes from your package's pyproject.toml, [project.entry-points."pbcs_ompl.agents"].
+A registered name comes from your package's pyproject.toml, [project.entry-points."pbcs_ompl.agents"].
 """
 
 import gymnasium
@@ -17,7 +17,7 @@ from pbcs_ompl.agents import Policy, TD3Settings
 
 
 class Spaces(gymnasium.Env):
-    """All that stable-baselines3 wants of an environment that it never steps."""
+    """What stable-baselines3 needs of an environment that it never steps."""
 
     def __init__(self, observation_size, low, high):
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (observation_size,), np.float32)
@@ -27,7 +27,7 @@ class Spaces(gymnasium.Env):
 class StableTD3:
     """Arrays are [S, B, ...] for a stack of S agents; this one is always a stack of one."""
 
-    settings_type = TD3Settings  # anything with from_preset(name, **changes)
+    settings_type = TD3Settings  # any class with from_preset(name, **changes)
     BUFFER = ("observations", "next_observations", "actions", "rewards", "dones")
 
     def __init__(self, observation_size, action_low, action_high, *, settings, seeds, device="cpu"):
@@ -71,7 +71,7 @@ class StableTD3:
         return Policy(arrays, self.low.copy(), self.high.copy())
 
     def state_dict(self):
-        """All but the state of the random numbers: a resumed training goes on well, if not bit for bit."""
+        """All but the state of the random numbers: a resumed training continues, but not bit for bit."""
         state = {f"policy/{name}": tensor.cpu().numpy() for name, tensor in self.model.policy.state_dict().items()}
         for which, optimizer in self.optimizers.items():
             state |= {f"{which}/{index}/{name}": tensor.cpu().numpy() for index, moments in

@@ -10,9 +10,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents import losses
 from pbcs_ompl.agents.kernels.ddpg import Constants, Stack, update_many, update_one
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
-from pbcs_ompl.agents.losses import critic_loss, policy_loss
 from pbcs_ompl.agents.networks import TrainedNetwork
 from pbcs_ompl.agents.replay import Batch
 from pbcs_ompl.agents.settings import AgentSettings
@@ -41,17 +41,19 @@ class DDPG(StackedAgent):
 
     def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor) -> dict[str, Tensor]:
         """Make one update; see `StackedAgent.update`."""
-        values = self.minimise(self.critic, critic_rate, critic_loss, batch.obs_actions, self.td_targets(batch))
-        climbed = self.minimise(self.actor, actor_rate, policy_loss, self.critic.weights, batch.observations, self.box)
+        critic_loss = self.minimise(self.critic, critic_rate, losses.critic_loss,
+                                    batch.obs_actions, self.td_targets(batch))
+        actor_loss = self.minimise(self.actor, actor_rate, losses.policy_loss,
+                                   self.critic.weights, batch.observations, self.box)
         self.update_targets()
-        return {"critic_loss": values, "actor_loss": climbed}
+        return {"critic_loss": critic_loss, "actor_loss": actor_loss}
 
     def run_updates(self, rows: Tensor, first: int) -> dict[str, np.ndarray]:
         """Make the same updates by the compiled kernel where it can: four times faster on a CPU."""
         usable = self.compile == "auto" and self.device.type == "cpu" and not self.settings.layer_norm
         if not (usable and self.gradients):
             return super().run_updates(rows, first)
-        losses = np.empty((*rows.shape[:2], 2), dtype=np.float32)
+        filled = np.empty((*rows.shape[:2], 2), dtype=np.float32)
         critic_rates, actor_rates = self.adam_rates(first, len(rows))
         constants = Constants(self.box.half.numpy(), self.box.centre.numpy(), np.float32(self.settings.discount),
                               np.float32(1.0 - self.settings.polyak))
@@ -60,9 +62,9 @@ class DDPG(StackedAgent):
         numba.set_num_threads(threads)
         run = update_one if threads == 1 else update_many
         run(rows.numpy(), torch.stack((actor_rates, critic_rates), dim=1).numpy(), _stack(self.actor, len(self.seeds)),
-            _stack(self.critic, len(self.seeds)), constants, losses)
+            _stack(self.critic, len(self.seeds)), constants, filled)
         numba.set_num_threads(before)
-        critic_losses, actor_losses = np.moveaxis(losses.astype(np.float64), 2, 0)
+        critic_losses, actor_losses = np.moveaxis(filled.astype(np.float64), 2, 0)
         return {"critic_loss": critic_losses, "actor_loss": actor_losses}
 
 

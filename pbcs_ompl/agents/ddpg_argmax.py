@@ -17,9 +17,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents import losses
 from pbcs_ompl.agents.kernels.counter_rng import uniform
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
-from pbcs_ompl.agents.losses import ActionBox, Network, critic_loss, imitation_loss
+from pbcs_ompl.agents.losses import ActionBox, Network
 from pbcs_ompl.agents.replay import Batch
 from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
@@ -57,11 +58,12 @@ class DDPGArgmax(StackedAgent):
 
     def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor, candidates: Tensor) -> dict[str, Tensor]:
         """Make one update; see `StackedAgent.update`."""
-        values = self.minimise(self.critic, critic_rate, critic_loss, batch.obs_actions, self.td_targets(batch))
+        critic_loss = self.minimise(self.critic, critic_rate, losses.critic_loss,
+                                    batch.obs_actions, self.td_targets(batch))
         best = best_candidates(self.critic.weights, batch.observations, candidates, self.box)
-        distance = self.minimise(self.actor, actor_rate, imitation_loss, batch.observations, best)
+        actor_loss = self.minimise(self.actor, actor_rate, losses.imitation_loss, batch.observations, best)
         self.update_targets()
-        return {"critic_loss": values, "actor_loss": distance}
+        return {"critic_loss": critic_loss, "actor_loss": actor_loss}
 
 
 def best_candidates(critic: Network, observations: Tensor, candidates: Tensor, box: ActionBox) -> Tensor:

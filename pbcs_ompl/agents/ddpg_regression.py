@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
+from pbcs_ompl.agents import losses
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
-from pbcs_ompl.agents.losses import critic_loss, improvement_loss
 from pbcs_ompl.agents.replay import Batch
 from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
@@ -36,8 +36,9 @@ class DDPGRegression(StackedAgent):
 
     def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor) -> dict[str, Tensor]:
         """Make one update; see `StackedAgent.update`."""
-        targets, critic = self.td_targets(batch), self.critic.weights
-        distance = self.minimise(self.actor, actor_rate, improvement_loss, critic, batch.obs_actions, targets, self.box)
-        values = self.minimise(self.critic, critic_rate, critic_loss, batch.obs_actions, targets)
+        targets = self.td_targets(batch)
+        actor_loss = self.minimise(self.actor, actor_rate, losses.improvement_loss,
+                                   self.critic.weights, batch.obs_actions, targets, self.box)
+        critic_loss = self.minimise(self.critic, critic_rate, losses.critic_loss, batch.obs_actions, targets)
         self.update_targets()
-        return {"critic_loss": values, "actor_loss": distance}
+        return {"critic_loss": critic_loss, "actor_loss": actor_loss}

@@ -248,7 +248,7 @@ def _adam_step(weights: Tensor, gradient: Tensor, mean: Tensor, square: Tensor, 
 def adam_rates(learning_rate: float, numbers: Iterable[int], device: torch.device) -> Tensor:
     """Return step sizes and epsilons [K, 2] of Adam's steps with these K numbers (counted from 1).
 
-    Kingma and Ba's own reordering takes both bias corrections out of the loop over the parameters.
+    The reordering of Kingma and Ba takes both bias corrections out of the loop over the parameters.
 
     Args:
         learning_rate: Adam's alpha.

@@ -111,7 +111,7 @@ class OrnsteinUhlenbeck:
         self._x: Array | None = None
 
     def keep(self, indices: Sequence[int]) -> None:
-        """Keep the x of these seeds."""
+        """Continue with the x of these seeds."""
         self._x = None if self._x is None else self._x[list(indices)]
 
     def draw(self, generator: np.random.Generator, shape: tuple[int, ...], action_size: int) -> Array:

@@ -96,9 +96,9 @@ class Policy:
         return cls(layers, low, high)
 
 
-def to_box(unit: np.ndarray, low: Array, high: Array) -> Array:
+def to_box(squashed: np.ndarray, low: Array, high: Array) -> Array:
     """Map values in [-1, 1] onto the box, as float64; rounding never leaves the box."""
-    actions = (unit.astype(np.float64) + 1.0) * (0.5 * (high - low)) + low
+    actions = (squashed.astype(np.float64) + 1.0) * (0.5 * (high - low)) + low
     return np.minimum(np.maximum(actions, low, out=actions), high, out=actions)
 
 

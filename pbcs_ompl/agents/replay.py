@@ -116,7 +116,7 @@ class Replay:
         self._drawn = int(state["drawn"])
 
     def _reserve(self, size: int) -> None:
-        """Grow by doubling; a ring never wraps before it has its full capacity, so rows keep their places."""
+        """Grow by doubling; a ring never wraps before it has its full capacity, so rows keep their positions."""
         allocated = self._rows.shape[1]
         if min(size, self.capacity) <= allocated:
             return

@@ -14,9 +14,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents import losses
 from pbcs_ompl.agents.kernels.counter_rng import normal, stream_keys
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
-from pbcs_ompl.agents.losses import critic_loss, sample_squashed, soft_policy_loss, td_targets, temperature_loss
 from pbcs_ompl.agents.networks import TrainedNetwork, TrainedScalar
 from pbcs_ompl.agents.policy import to_box
 from pbcs_ompl.agents.replay import Batch
@@ -88,10 +88,10 @@ class SAC(StackedAgent):
         """Make one update; see `StackedAgent.update`."""
         temperature = self.log_temperature.values.exp()
         targets = self.soft_targets(batch, noise[:, 0], temperature).repeat(2, 1, 1)
-        twins = self.minimise(self.critic, critic_rate, critic_loss, batch.obs_actions.repeat(2, 1, 1), targets)
-        actor_loss, log_density = self.minimise(self.actor, actor_rate, soft_policy_loss, self.critic.weights,
+        twins = self.minimise(self.critic, critic_rate, losses.critic_loss, batch.obs_actions.repeat(2, 1, 1), targets)
+        actor_loss, log_density = self.minimise(self.actor, actor_rate, losses.soft_policy_loss, self.critic.weights,
                                                 batch.observations, noise[:, 1], temperature, self.box)
-        self.minimise(self.log_temperature, temperature_rate, temperature_loss, log_density, -self.action_size)
+        self.minimise(self.log_temperature, temperature_rate, losses.temperature_loss, log_density, -self.action_size)
         self.critic.update_target(self.settings.polyak)
         return {"critic_loss": twins.view(2, -1).sum(dim=0), "actor_loss": actor_loss, "temperature": temperature}
 
@@ -103,11 +103,11 @@ class SAC(StackedAgent):
             noise: Standard normal numbers [S, B, A], of which a' is made.
             temperature: [S].
         """
-        squashed, log_density = sample_squashed(self.actor.weights(batch.next_observations), noise)
+        squashed, log_density = losses.sample_squashed(self.actor.weights(batch.next_observations), noise)
         inputs = self.box.join(batch.next_observations, squashed).repeat(2, 1, 1)
         next_values = torch.minimum(*self.critic.target(inputs).chunk(2))
         next_values = next_values - temperature[:, None, None] * log_density
-        return td_targets(batch.rewards, batch.not_done, next_values, self.settings.discount)
+        return losses.td_targets(batch.rewards, batch.not_done, next_values, self.settings.discount)
 
     def explore(self, observations: Array) -> Array:
         """Return actions [S, B, A] drawn from the policies."""
@@ -115,7 +115,7 @@ class SAC(StackedAgent):
         noise = normal(self._sample_keys, int(self._num_samples), count, (self.action_size,)).swapaxes(0, 1)
         with torch.inference_mode():
             outputs = self.actor.weights(self.tensor(observations))
-            squashed, _ = sample_squashed(outputs, torch.from_numpy(noise).to(self.device))
+            squashed, _ = losses.sample_squashed(outputs, torch.from_numpy(noise).to(self.device))
             self._num_samples += count
             return to_box(squashed.cpu().numpy(), self.action_low, self.action_high)
 

@@ -278,8 +278,8 @@ class StackedAgent(ABC):
         """Return a copy of one seed's actor that no longer changes."""
         layers: list[tuple[np.ndarray, ...]] = []
         for weight, *vectors in (layer.tensors() for layer in self.actor.weights.layers):
-            own = (weight[seed_index], *(vector[seed_index, 0] for vector in vectors))
-            layers.append(tuple(part.cpu().numpy().copy() for part in own))
+            parts = (weight[seed_index], *(vector[seed_index, 0] for vector in vectors))
+            layers.append(tuple(part.cpu().numpy().copy() for part in parts))
         actions = self.action_size
         layers[-1] = tuple(np.ascontiguousarray(part[..., :actions]) for part in layers[-1])
         return Policy(tuple(layers), self.action_low.copy(), self.action_high.copy())

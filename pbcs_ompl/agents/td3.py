@@ -10,9 +10,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents import losses
 from pbcs_ompl.agents.kernels.counter_rng import normal
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
-from pbcs_ompl.agents.losses import critic_loss, policy_loss, td_targets
 from pbcs_ompl.agents.replay import Batch
 from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
@@ -63,14 +63,14 @@ class TD3(StackedAgent):
                full: bool) -> dict[str, Tensor]:
         """Make one update; the actor's loss is 0 in those that leave it as it is."""
         targets = self.smoothed_targets(batch, noise).repeat(2, 1, 1)
-        twins = self.minimise(self.critic, critic_rate, critic_loss, batch.obs_actions.repeat(2, 1, 1), targets)
-        both = twins.view(2, -1).sum(dim=0)
+        twins = self.minimise(self.critic, critic_rate, losses.critic_loss, batch.obs_actions.repeat(2, 1, 1), targets)
+        critic_loss = twins.view(2, -1).sum(dim=0)
         if not full:
-            return {"critic_loss": both, "actor_loss": torch.zeros_like(both)}
+            return {"critic_loss": critic_loss, "actor_loss": torch.zeros_like(critic_loss)}
         first = self.critic.weights.first(len(self.seeds))
-        climbed = self.minimise(self.actor, actor_rate, policy_loss, first, batch.observations, self.box)
+        actor_loss = self.minimise(self.actor, actor_rate, losses.policy_loss, first, batch.observations, self.box)
         self.update_targets()
-        return {"critic_loss": both, "actor_loss": climbed}
+        return {"critic_loss": critic_loss, "actor_loss": actor_loss}
 
     def smoothed_targets(self, batch: Batch, noise: Tensor) -> Tensor:
         """Return y = r + discount min_i Q'_i(s', pi'(s') + clipped noise) [S, B, 1], or r at the end."""
@@ -79,4 +79,4 @@ class TD3(StackedAgent):
         squashed = self.actor.target(batch.next_observations).tanh_().add_(noise).clamp_(-1.0, 1.0)
         inputs = self.box.join(batch.next_observations, squashed).repeat(2, 1, 1)
         next_values = torch.minimum(*self.critic.target(inputs).chunk(2))
-        return td_targets(batch.rewards, batch.not_done, next_values, self.settings.discount)
+        return losses.td_targets(batch.rewards, batch.not_done, next_values, self.settings.discount)

@@ -32,7 +32,7 @@ def choose_device(name: str | torch.device) -> torch.device:
 
 def compiled(function: Callable[..., Any], compile: Compile, device: torch.device, *,
              record: bool) -> Callable[..., Any]:
-    """Return `function`, compiled by torch when asked for; "auto" does so on CUDA only.
+    """Return `function`, compiled by torch if `compile` is True; "auto" does so on CUDA only.
 
     On a CPU the hand-written gradients leave torch's compiler 5 to 20 %, for which it would take 5 to 40 s;
     there an algorithm may have a kernel, which is faster than both. When compilation fails, the function

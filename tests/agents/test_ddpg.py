@@ -28,7 +28,7 @@ def fill(agent: DDPG, *seeds: int) -> DDPG:
 
 
 def weights(agent: DDPG, seed_index: int) -> np.ndarray:
-    """All of one seed's parameters, targets and moments in a row."""
+    """All of one seed's parameters, targets and moments, concatenated."""
     state = agent.state_dict([seed_index])
     return np.concatenate([state[name] for name in sorted(state) if name.startswith(("actor/", "critic/"))])
 

@@ -1,4 +1,4 @@
-"""Networks, gradients, Adam and targets against torch's own."""
+"""Networks, gradients, Adam and targets against those of torch."""
 
 import numpy as np
 import pytest

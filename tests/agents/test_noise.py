@@ -1,4 +1,4 @@
-"""Laws of the three noises: what they draw, where they stop, when they begin anew, and that seeds stay apart."""
+"""Laws of the three noises: what they draw, their bounds, where they start again, and that seeds are independent."""
 
 import numpy as np
 import pytest
@@ -99,7 +99,7 @@ def test_wrong_names_and_values_are_named() -> None:
 def test_seeds_that_are_kept_explore_as_they_would_have_in_the_whole_stack(name: str) -> None:
     steps, kept = 8, [2, 0]
     whole, part = make_noise(name), make_noise(name)
-    part.keep(range(3))  # before the first step there is nothing to forget
+    part.keep(range(3))  # before the first step there is nothing to lose
     draws = draw_all(whole, generators(1, 2, 3), (steps, 4), 2)
     middle = np.broadcast_to(CENTRE, (3, 4, 2))
     for t in range(steps):

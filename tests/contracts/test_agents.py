@@ -139,7 +139,7 @@ def test_a_part_of_a_stack_trains_as_it_would_have_in_the_whole(entry, layer_nor
     np.testing.assert_allclose(part.explore(np.ones((2, 5, 3))), explored, atol=1e-5)
 
 
-def test_updates_do_not_depend_on_how_many_are_asked_for_at_once(entry):
+def test_updates_do_not_depend_on_how_many_are_made_in_one_call(entry):
     first, second = fill(make(entry, 1), 3), fill(make(entry, 1), 3)
     first.train(20)
     for count in (1, 6, 13):

@@ -114,8 +114,8 @@ def policy_gradient(actor: TrainedNetwork, critic: Weights, observations: Tensor
 def imitation_gradient(actor: TrainedNetwork, observations: Tensor, squashed: Tensor) -> Tensor:
     """Do `losses.imitation_loss`."""
     outputs, activations = forward(actor.weights, observations)
-    own = outputs.tanh()
-    return _pull(actor, activations, own, own - squashed)
+    actions = outputs.tanh()
+    return _pull(actor, activations, actions, actions - squashed)
 
 
 def improvement_gradient(actor: TrainedNetwork, critic: Weights, obs_actions: Tensor, targets: Tensor,

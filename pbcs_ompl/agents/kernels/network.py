@@ -112,8 +112,8 @@ def adam_step(sizes: Sizes, weights: np.ndarray, mean: np.ndarray, square: np.nd
         fan_out = sizes[layer + 1]
         weight, bias = parameter_offsets(sizes, layer, seeds, seed)
         for offset, length in ((weight, sizes[layer] * fan_out), (bias, fan_out)):
-            own = slice(offset, offset + length)
-            _adam(weights[own], mean[own], square[own], gradient[start : start + length], rate[0], rate[1])
+            part = slice(offset, offset + length)
+            _adam(weights[part], mean[part], square[part], gradient[start : start + length], rate[0], rate[1])
             start += length
 
 
