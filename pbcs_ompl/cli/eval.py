@@ -12,7 +12,7 @@ from pbcs_ompl.resettable import make
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.evaluation import evaluate
-from pbcs_ompl.skills.training import CHAIN
+from pbcs_ompl.results.files import CHAIN
 
 
 def run(arguments: Namespace) -> int:

@@ -13,7 +13,7 @@ from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.formatting import duration, short
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.command_words import environment_words
+from pbcs_ompl.results.command_line import environment_words
 
 
 def run(arguments: Namespace) -> int:

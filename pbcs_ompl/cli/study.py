@@ -11,12 +11,13 @@ from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import in_words
-from pbcs_ompl.experiments.study import Study, find_study, run_shard, run_study, study_ids
-from pbcs_ompl.experiments.study.execute import open_study
+from pbcs_ompl.experiments.run_study import run_shard, run_study
+from pbcs_ompl.experiments.study import Study, find_study, study_ids
+from pbcs_ompl.experiments.run_study import open_study
 from pbcs_ompl.experiments.study.runs import record_name, run_settings
-from pbcs_ompl.experiments.workers import Shard
+from pbcs_ompl.experiments.run import Shard
 from pbcs_ompl.experiments.workers.schedulers import makefile, slurm_script
-from pbcs_ompl.results.folder import write_text
+from pbcs_ompl.results.files import write_text
 
 VERDICTS = {True: "agrees", False: "DIFFERS", None: "no data"}
 

@@ -4,7 +4,7 @@ import shlex
 from argparse import Namespace
 from pathlib import Path
 
-from pbcs_ompl.bridge.plan import TRAJECTORY
+from pbcs_ompl.results.files import TRAJECTORY
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.cli.arguments import build_parser, environment
 from pbcs_ompl.cli.folders import fresh_folder
@@ -13,7 +13,7 @@ from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary, w
 from pbcs_ompl.core.errors import InvalidOption, TrainingStalled
 from pbcs_ompl.core.formatting import duration, percent, short
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import CONFIG
+from pbcs_ompl.results.files import CONFIG
 from pbcs_ompl.skills import TrainResult, resume, train
 
 

@@ -20,8 +20,9 @@ from pbcs_ompl.core.errors import (
     UnknownName,
 )
 from pbcs_ompl.experiments.compare import compare, read_comparison, runner
-from pbcs_ompl.experiments.compare.sweep import Sweep, make_sweep
-from pbcs_ompl.results.folder import open_run, read_toml, to_toml, write_text
+from pbcs_ompl.experiments.sweep import Sweep, make_sweep
+from pbcs_ompl.results.files import read_toml, to_toml, write_text
+from pbcs_ompl.results.folder import open_run
 
 MAZE = "pbcs/Maze-v0"
 RRT, KPIECE1 = "ompl.control:RRT", "ompl.control:KPIECE1"

@@ -8,10 +8,10 @@ import pytest
 from ompl.tools import readBenchmarkLog
 
 from pbcs_ompl.core.errors import RunFolderError
-from pbcs_ompl.experiments.compare.benchmark_log import write_logs
-from pbcs_ompl.experiments.compare.database import write_database
-from pbcs_ompl.experiments.compare.run import broken
-from pbcs_ompl.experiments.compare.sweep import make_sweep
+from pbcs_ompl.experiments.planner_arena import write_logs
+from pbcs_ompl.experiments.planner_arena import write_database
+from pbcs_ompl.experiments.planning_run import broken
+from pbcs_ompl.experiments.sweep import make_sweep
 
 EXPERIMENTS = ["id", "name", "totaltime", "timelimit", "memorylimit", "runcount", "version", "hostname",
                "cpuinfo", "date", "seed", "setup"]

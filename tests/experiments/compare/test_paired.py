@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
-from pbcs_ompl.experiments.compare.paired import holm, sign_tests
-from pbcs_ompl.experiments.compare.run import Job, broken
+from pbcs_ompl.experiments.planner_statistics import holm, sign_tests
+from pbcs_ompl.experiments.planning_run import Job, broken
 
 BUDGET = 100
 

@@ -7,7 +7,7 @@ import numpy as np
 import psutil
 import pytest
 
-from pbcs_ompl.experiments.compare.run import MEASURED, Job, broken, folder_of, run
+from pbcs_ompl.experiments.planning_run import MEASURED, Job, broken, folder_of, run
 
 JOB = Job("1-Maze-v0/Ex-3", "Ex", 3, "pbcs/Maze-v0", {"size": 2}, {}, 5000, None)
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from pbcs_ompl.experiments.study import find_study, rate
+from pbcs_ompl.experiments.claims import rate
+from pbcs_ompl.experiments.study import find_study
 
 LOOP = {"steps": 200, "evaluate_every": 100, "patience": 3}
 ANALYSE = find_study("deadlock").analyse

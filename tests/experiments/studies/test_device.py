@@ -6,7 +6,7 @@ import torch
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.experiments.study import find_study
-from pbcs_ompl.results.folder import read_toml
+from pbcs_ompl.results.files import read_toml
 
 DEVICES = [pytest.param("cpu"), pytest.param("cuda", marks=pytest.mark.skipif(not torch.cuda.is_available(),
                                                                               reason="no CUDA device"))]

@@ -11,7 +11,9 @@ import pytest
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, PbcsError, RunFolderError, UnknownName
-from pbcs_ompl.experiments.study import find_study, rate, run_study, study_ids
+from pbcs_ompl.experiments.claims import rate
+from pbcs_ompl.experiments.run_study import run_study
+from pbcs_ompl.experiments.study import find_study, study_ids
 
 SWEEP = 'title = "Heads or tails"\nseeds = 3\nsides = 2\n'
 SCRIPT = '''
@@ -35,7 +37,7 @@ def run(settings):
 '''
 ANALYSIS = '''
 from pbcs_ompl.figures.canvas import new_figure, save
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 
 def analyse(records, figures):
     figure, axes = new_figure()

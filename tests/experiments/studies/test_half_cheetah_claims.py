@@ -8,7 +8,7 @@ import pytest
 from pbcs_ompl.agents import Policy
 from pbcs_ompl.experiments.study import find_study
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import read_arrays
+from pbcs_ompl.results.files import read_arrays
 
 STUDY = find_study("half-cheetah-priming")
 

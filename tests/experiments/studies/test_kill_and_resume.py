@@ -12,8 +12,9 @@ import pytest
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
-from pbcs_ompl.experiments.study import find_study, run_study
-from pbcs_ompl.experiments.study.execute import open_study
+from pbcs_ompl.experiments.run_study import run_study
+from pbcs_ompl.experiments.study import find_study
+from pbcs_ompl.experiments.run_study import open_study
 
 RUNS, KILLS = 120, 8
 SCRIPT = f'''
@@ -31,7 +32,7 @@ def run(settings):
     return {{"seed": settings["seed"], "walk": [draw.random() for _ in range(20_000)]}}
 '''
 ANALYSIS = '''
-from pbcs_ompl.experiments.study import Claim
+from pbcs_ompl.experiments.claims import Claim
 
 def analyse(records, figures):
     return [Claim("all came back", [one["seed"] for one in records] == list(range(len(records))))]

@@ -6,7 +6,7 @@ import pytest
 from pbcs_ompl.agents import DDPG, DDPGSettings
 from pbcs_ompl.agents.noise import make_noise
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.experiments.study.stacked_training import NEVER, LoopSettings, StackedTraining, solved
+from pbcs_ompl.experiments.stacked_training import NEVER, LoopSettings, StackedTraining, solved
 from pbcs_ompl.resettable import make
 
 TOY = make("pbcs/Toy1D-v0")

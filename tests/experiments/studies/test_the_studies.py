@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.experiments.study import find_study, study_ids
-from pbcs_ompl.experiments.study.random_walk import found_by
+from pbcs_ompl.experiments.studies.toy_analysis.random_walk import found_by
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import to_toml
+from pbcs_ompl.results.files import to_toml
 
 LOOP = {"steps": 100, "evaluate_every": 50, "patience": 1}
 SMALL = {

@@ -6,7 +6,7 @@ import pytest
 
 import pbcs_ompl
 from pbcs_ompl.core.errors import TrainingStalled, UnknownName
-from pbcs_ompl.experiments.study.trained import trained
+from pbcs_ompl.experiments.training_run import trained
 from pbcs_ompl.skills import Evaluation
 
 MAZE = {"size": 2}

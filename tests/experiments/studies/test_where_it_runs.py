@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.experiments.study import find_study, run_shard, run_study
-from pbcs_ompl.experiments.workers import Shard
+from pbcs_ompl.experiments.run_study import run_shard, run_study
+from pbcs_ompl.experiments.study import find_study
+from pbcs_ompl.experiments.run import Shard
 from pbcs_ompl.experiments.workers.schedulers import LARGEST_ARRAY, slurm_script
 
 SCRIPT = '''
@@ -29,7 +30,7 @@ def run(settings):
     return {"square": settings["seed"] ** 2}
 '''
 ANALYSIS = '''
-from pbcs_ompl.experiments.study import Claim
+from pbcs_ompl.experiments.claims import Claim
 
 def analyse(records, figures):
     return [Claim("they are squares", [one["square"] for one in records] == [n * n for n in range(len(records))])]

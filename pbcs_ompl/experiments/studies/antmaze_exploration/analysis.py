@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from scipy.stats import mannwhitneyu
 
-from pbcs_ompl.experiments.compare.statistics import censored
-from pbcs_ompl.experiments.study import Claim, rate
-from pbcs_ompl.experiments.study.paired import FEWEST, SURE
+from pbcs_ompl.experiments.planner_statistics import censored
+from pbcs_ompl.experiments.claims import Claim, rate
+from pbcs_ompl.experiments.claims import FEWEST_PAIRS, SIGNIFICANCE
 from pbcs_ompl.figures.canvas import save
 from pbcs_ompl.figures.compare import distribution_figure
 from pbcs_ompl.figures.maze import stage
@@ -59,15 +59,15 @@ def _fewer(planners: dict[str, Records], budget: int) -> list[Claim]:
     ex = needed.pop("Ex", np.empty(0))
     claims = []
     for name, others in needed.items():
-        told = min(len(ex), len(others)) >= FEWEST
+        told = min(len(ex), len(others)) >= FEWEST_PAIRS
         chance = float(mannwhitneyu(ex, others, alternative="less").pvalue) if told else 1.0
         medians = {f"median, {one}": float(np.median(values)) if len(values) else None
                    for one, values in (("Ex", ex), (name, others))}
-        claims.append(Claim(f"Ex needs fewer transitions than {name} (Mann-Whitney, p < {SURE})",
-                            chance < SURE if told else None,
+        claims.append(Claim(f"Ex needs fewer transitions than {name} (Mann-Whitney, p < {SIGNIFICANCE})",
+                            chance < SIGNIFICANCE if told else None,
                             {**medians, f"solved, {name}": rate((others < budget).sum(), len(others)), "p": chance},
                             FIGURE if name == "RRT-NH" else "beyond the thesis",
-                            "" if told else f"fewer than {FEWEST} seeds: no test can tell"))
+                            "" if told else f"fewer than {FEWEST_PAIRS} seeds: no test can tell"))
     return claims
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import LogNorm
 
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.by_group import rates_figure
 from pbcs_ompl.figures.canvas import save
 from pbcs_ompl.figures.maze import legend_below, stage

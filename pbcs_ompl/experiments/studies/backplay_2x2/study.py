@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.agents import DDPG, DDPGSettings, EpsilonGreedy
-from pbcs_ompl.experiments.study.stacked_training import LoopSettings, StackedTraining
-from pbcs_ompl.experiments.study.trained import trained
+from pbcs_ompl.experiments.stacked_training import LoopSettings, StackedTraining
+from pbcs_ompl.experiments.training_run import trained
 from pbcs_ompl.resettable import make
 
 MAZE = {"size": 2}

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.core.statistics import wilson
-from pbcs_ompl.experiments.study import Claim, rate
-from pbcs_ompl.experiments.study.joined import joined_first_rewards, joined_observed, joined_rows, joined_success
+from pbcs_ompl.experiments.claims import Claim, rate
+from pbcs_ompl.experiments.stacked_training import joined_first_rewards, joined_observed, joined_rows, joined_success
 from pbcs_ompl.figures.canvas import new_figure, save
 from pbcs_ompl.figures.diagnostics import critic_map_figure, curves_figure, slices_figure, success_figure
 

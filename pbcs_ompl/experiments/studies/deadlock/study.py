@@ -11,9 +11,9 @@ from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.registry import load
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.diagnostics import value_slices
-from pbcs_ompl.experiments.study.joined import chunks
-from pbcs_ompl.experiments.study.observers import Probe
-from pbcs_ompl.experiments.study.stacked_training import LoopSettings, StackedTraining
+from pbcs_ompl.experiments.stacked_training import chunks
+from pbcs_ompl.experiments.diagnostic_batch import DiagnosticBatch
+from pbcs_ompl.experiments.stacked_training import LoopSettings, StackedTraining
 from pbcs_ompl.resettable import make
 
 MAPPED_STATES = np.linspace(0.0, 1.0, 101)
@@ -37,7 +37,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     if settings["variant"] == "drift":
         return _drift(settings)
     model = make("pbcs/Toy1D-v0")
-    agent, probe = _agent(settings, model, settings["seeds"]), Probe(model)
+    agent, probe = _agent(settings, model, settings["seeds"]), DiagnosticBatch(model)
     discount = settings["agent_settings"]["discount"]
     observers = probe.observers() | {
         "distance_to_returns": lambda agent: probe.distance_to_returns(agent, discount, HORIZON)}
@@ -83,7 +83,7 @@ def _drift(settings: dict[str, Any]) -> dict[str, Any]:
     """Train on random transitions without any reward; take down how far actor and critic go."""
     model, drift = make("pbcs/Drift-v0"), settings["drift"]
     seeds = list(range(drift["seeds"]))
-    agent, probe = _agent(settings, model, seeds), Probe(model)
+    agent, probe = _agent(settings, model, seeds), DiagnosticBatch(model)
     _fill_without_reward(agent, drift["transitions"])
     rows = {"largest_value": [probe.largest_value(agent)], "largest_action": [probe.largest_action(agent)]}
     for _ in range(drift["updates"] // drift["every"]):

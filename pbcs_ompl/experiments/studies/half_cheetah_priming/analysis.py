@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import mannwhitneyu, t
 
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.canvas import new_figure, save
 
 LATE = 10

@@ -13,7 +13,7 @@ from pbcs_ompl.agents import TD3, Policy, TD3Settings
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import write_arrays
+from pbcs_ompl.results.files import write_arrays
 
 EXPERT = Path(__file__).with_name("expert.npz")
 EPISODE, EPISODES, WARM_UP, BLOCK = 1000, 500, 10, 50

@@ -17,7 +17,7 @@ from pbcs_ompl.core.registry import load
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import read_arrays
+from pbcs_ompl.results.files import read_arrays
 
 EXPERT = "expert.npz"
 

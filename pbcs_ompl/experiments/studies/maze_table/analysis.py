@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.patches import Circle
 from scipy.stats import binomtest
 
-from pbcs_ompl.experiments.study import Claim, rate
-from pbcs_ompl.experiments.study.paired import FEWEST, SURE
+from pbcs_ompl.experiments.claims import Claim, rate
+from pbcs_ompl.experiments.claims import FEWEST_PAIRS, SIGNIFICANCE
 from pbcs_ompl.figures.by_group import rates_figure, values_figure
 from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED, new_figure, save
 from pbcs_ompl.figures.chain import chain_figure
@@ -50,7 +50,7 @@ def _solved(records: Records, key: str = "solved") -> dict[str, Any]:
 def _any_solved(records: Records) -> bool | None:
     """Return whether any of them is solved; None when there are too few to say that there is none."""
     solved = any(record["solved"] for record in records)
-    return solved if solved or len(records) >= FEWEST else None
+    return solved if solved or len(records) >= FEWEST_PAIRS else None
 
 
 def _by_size(records: Records, label: str) -> dict[str, Any]:
@@ -105,9 +105,9 @@ def _backplay(records: Records) -> list[Claim]:
     backplay, alone = _solved(small), _solved(_of(records, "DDPG", 2))
     return [_fails_from_3x3(records, "PB", "PB"),
             Claim("PB regularly fails in 2x2 mazes (in at least one run of ten)",
-                  backplay["rate"] <= 0.9 if len(small) >= FEWEST else None, _counts(small), "[Matheron2020] 5.6"),
+                  backplay["rate"] <= 0.9 if len(small) >= FEWEST_PAIRS else None, _counts(small), "[Matheron2020] 5.6"),
             Claim("PB solves 2x2 mazes much more often than DDPG alone (the intervals lie apart)",
-                  backplay["wilson"][0] > alone["wilson"][1] if min(backplay["n"], alone["n"]) >= FEWEST else None,
+                  backplay["wilson"][0] > alone["wilson"][1] if min(backplay["n"], alone["n"]) >= FEWEST_PAIRS else None,
                   {"PB": backplay, "DDPG": alone}, "[Matheron2020] 5.6, Fig. 5.3")]
 
 
@@ -120,8 +120,8 @@ def _compared(records: Records) -> list[Claim]:
                  if (r["size"], r["seed"]) in pbcs]
         ours, theirs = (sum(one > other for one, other in pairs), sum(one < other for one, other in pairs))
         chance = binomtest(ours, ours + theirs, alternative="greater").pvalue if ours + theirs else 1.0
-        claims.append(Claim(f"within the same million transitions PBCS solves more mazes than {label} (p < {SURE})",
-                            bool(chance < SURE) if len(pairs) >= FEWEST else None,
+        claims.append(Claim(f"within the same million transitions PBCS solves more mazes than {label} (p < {SIGNIFICANCE})",
+                            bool(chance < SIGNIFICANCE) if len(pairs) >= FEWEST_PAIRS else None,
                             {"PBCS": rate(sum(one for one, _ in pairs), len(pairs)),
                              label: rate(sum(other for _, other in pairs), len(pairs)),
                              f"only PBCS, only {label}": [ours, theirs], "p (McNemar, exact)": float(chance)},

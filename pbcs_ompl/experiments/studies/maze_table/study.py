@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pbcs_ompl.experiments.study.trained import trained
+from pbcs_ompl.experiments.training_run import trained
 from pbcs_ompl.resettable import make
 from pbcs_ompl.skills import TrainResult
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.canvas import new_figure, save
 from pbcs_ompl.figures.critic import critic_figure
 from pbcs_ompl.figures.diagnostics import success_figure

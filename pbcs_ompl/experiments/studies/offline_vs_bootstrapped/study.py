@@ -10,8 +10,8 @@ from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.agents.update import one_thread
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.experiments.study.joined import chunks
-from pbcs_ompl.experiments.study.stacked_training import LoopSettings, StackedTraining, solved
+from pbcs_ompl.experiments.stacked_training import chunks
+from pbcs_ompl.experiments.stacked_training import LoopSettings, StackedTraining, solved
 from pbcs_ompl.resettable import make
 from pbcs_ompl.skills.exploration import explore
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.canvas import new_figure, save
 
 OURS = "beyond [Matheron2020], which trains in 2-D mazes only"

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pbcs_ompl.experiments.study.trained import trained
+from pbcs_ompl.experiments.training_run import trained
 
 KEPT = ("solved", "success_rate", "nominal_success_rate", "steps_median", "skills", "plan_transitions",
         "train_transitions", "updates", "cpu_seconds", "stalled")

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.canvas import new_figure, save
 
 DEVIATIONS = 4.0

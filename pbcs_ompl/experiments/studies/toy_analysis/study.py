@@ -8,7 +8,7 @@ import numpy as np
 from pbcs_ompl.agents import DDPG
 from pbcs_ompl.agents.noise import EpsilonGreedy, draw_all
 from pbcs_ompl.core.seeding import SeedTree
-from pbcs_ompl.experiments.study.random_walk import densities, simulate
+from pbcs_ompl.experiments.studies.toy_analysis.random_walk import densities, simulate
 from pbcs_ompl.resettable import make
 
 POSITIONS = np.linspace(-1.0, 8.0, 451)

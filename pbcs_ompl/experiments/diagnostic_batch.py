@@ -1,4 +1,4 @@
-"""What a stacked training can take down at each evaluation: the diagnostics, on the same random states every time."""
+"""Diagnostics that a stacked training records at each evaluation, on the same random states every time."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.experiments.study.stacked_training import Observer
+from pbcs_ompl.experiments.stacked_training import Observer
 
 ROUNDS = 100
 
@@ -28,8 +28,8 @@ def sample_states(model: ResettableModel, count: int, seed: int = 0) -> Array:
     raise InvalidState(f"{model.spec.id}: {len(found)} valid states in {ROUNDS * count} draws, expected {count}")
 
 
-class Probe:
-    """Random states and actions at which the agents of a stack are asked.
+class DiagnosticBatch:
+    """Random states and actions at which the agents of a stack are evaluated.
 
     Args:
         count: How many states, each with one action.

@@ -4,14 +4,24 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import gymnasium
+
+from pbcs_ompl.bridge.planner_spec import PlannerSpec
+from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.bridge.termination import checked_limits
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.experiments.compare.run import Job
+from pbcs_ompl.core.errors import InvalidOption, MissingDependency, PlannerUnavailable
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.ompl_access import quiet_ompl
+from pbcs_ompl.core.types import Counter
+from pbcs_ompl.experiments.run import Run
 from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.make import is_known
 from pbcs_ompl.results.provenance import planning_versions
 
 Options = dict[str, Any]
+Environment = str | EnvSpec | gymnasium.Env | ResettableModel
+"""An environment that other processes can make: an id, a spec, or what has the spec of a registered id."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +44,15 @@ class Sweep:
     max_memory: float | None
     versions: dict[str, str]
 
-    def jobs(self) -> Iterator[Job]:
+    def runs(self) -> Iterator[Run]:
         """Yield the runs, seed by seed, so that all planners are equally far when a comparison is stopped."""
         for seed in self.seeds:
             for number, environment in enumerate(self.environments, start=1):
                 for planner, options in self.planners.items():
                     name = f"{self.folder(number)}/{planner.replace(':', '.')}-{seed}"
-                    yield Job(name, planner, seed, environment, options, self.max_transitions, self.max_seconds)
+                    yield Run(name, {"planner": planner, "planner_kwargs": options, "seed": seed,
+                                     "environment": environment.to_dict(), "max_transitions": self.max_transitions,
+                                     "max_seconds": self.max_seconds})
 
     def folder(self, number: int) -> str:
         """Return the name of the folder of the runs in the environment of this number; they are counted from 1."""
@@ -65,11 +77,17 @@ class Sweep:
 def make_sweep(planners: Sequence[str] | Mapping[str, Options], environments: Sequence[EnvSpec],
                seeds: int | Sequence[int], max_transitions: int, max_seconds: float | None,
                max_memory: float | None) -> Sweep:
-    """Return the sweep that `compare` was asked for; see there.
+    """Return the sweep of a comparison. The arguments are those of `compare`; see there.
+
+    Args:
+        planners: Names, or options by name.
+        environments: The environments.
+        seeds: How many seeds (0, 1, ...), or the seeds.
+        max_transitions, max_seconds, max_memory: The budget of one run.
 
     Raises:
-        InvalidOption: something is missing, there twice, or out of its range.
-        UnknownName, NotResettable, UnsupportedSpace: an environment cannot be made.
+        InvalidOption: something is missing, there twice, or out of its range; a planner refuses an option.
+        UnknownName, NotResettable, UnsupportedSpace: a planner or an environment cannot be made.
     """
     options = dict(planners) if isinstance(planners, Mapping) else {name: {} for name in planners}
     chosen = list(range(seeds)) if isinstance(seeds, int) else [int(seed) for seed in seeds]
@@ -77,26 +95,26 @@ def make_sweep(planners: Sequence[str] | Mapping[str, Options], environments: Se
     _check_unique("environments", [environment.label for environment in environments])
     _check_unique("seeds", chosen)
     limits = checked_limits(max_transitions, max_seconds)
-    if max_memory is not None and not max_memory > 0:
-        raise InvalidOption(f"max_memory is {max_memory}; expected more than 0 (MB)")
-    for environment in environments:
-        make(environment)
-    return Sweep(options, list(environments), chosen, *limits, max_memory, planning_versions())
+    models = [make(environment) for environment in environments]
+    resolved = {name: _resolved(name, given, models[0]) for name, given in options.items()}
+    return Sweep(resolved, list(environments), chosen, *limits, max_memory, planning_versions())
 
 
-def pair_environments(env: str | EnvSpec | Sequence[str | EnvSpec], env_kwargs: Options | Sequence[Options] | None, *,
-                      goal: str | None = None, feature: str | None = None,
+def environment_specs(env: Environment | Sequence[Environment], env_kwargs: Options | Sequence[Options] | None = None,
+                      *, goal: str | None = None, feature: str | None = None,
                       start_seed: int | None = None) -> list[EnvSpec]:
-    """Return the environments of a comparison.
+    """Return the specs of the environments of a comparison.
 
     Args:
-        env, env_kwargs: As many ids as options, or one of either for all of the other; specs have theirs already.
+        env: One environment or several.
+        env_kwargs: Options of ids: as many as there are environments, or one of either for all of the other.
         goal, feature, start_seed: The rules of all of them.
 
     Raises:
-        InvalidOption: the numbers do not match, or options are given for specs.
+        InvalidOption: the numbers do not match, options are given for what has its own, or an environment is not
+            registered.
     """
-    given = [env] if isinstance(env, str | EnvSpec) else list(env)
+    given = list(env) if isinstance(env, Sequence) and not isinstance(env, str) else [env]
     options = [{}] if env_kwargs is None else [env_kwargs] if isinstance(env_kwargs, Mapping) else list(env_kwargs)
     if len(given) == 1:
         given *= len(options)
@@ -108,14 +126,35 @@ def pair_environments(env: str | EnvSpec | Sequence[str | EnvSpec], env_kwargs: 
     return [_spec(one, dict(chosen), goal, feature, start_seed) for one, chosen in zip(given, options, strict=True)]
 
 
-def _spec(env: str | EnvSpec, options: Options, goal: str | None, feature: str | None,
+def _spec(env: Environment, options: Options, goal: str | None, feature: str | None,
           start_seed: int | None) -> EnvSpec:
     if isinstance(env, str):
         return EnvSpec(env, options, goal, feature, start_seed)
+    spec = env if isinstance(env, EnvSpec) else make(env).spec
     if options:
-        raise InvalidOption(f"{env} has its options already; leave out env_kwargs")
-    return replace(env, goal=env.goal if goal is None else goal, feature=env.feature if feature is None else feature,
-                   start_seed=env.start_seed if start_seed is None else start_seed)
+        raise InvalidOption(f"{spec} has its options already; leave out env_kwargs")
+    if not isinstance(env, EnvSpec) and not is_known(spec.id):
+        raise InvalidOption(f"{spec} is not registered, so that other processes cannot make it; register it with "
+                            "gymnasium.register, and give its id (module:id where a module registers it)")
+    return replace(spec, goal=spec.goal if goal is None else goal,
+                   feature=spec.feature if feature is None else feature,
+                   start_seed=spec.start_seed if start_seed is None else start_seed)
+
+
+def _resolved(planner: str, options: Options, model: ResettableModel) -> Options:
+    """Return the options of a planner. A planner that cannot be built here is left to its runs, which fail.
+
+    Raises:
+        UnknownName, InvalidOption: there is no such planner or option, or the planner refuses a value.
+    """
+    try:
+        spec = PlannerSpec(planner, options)
+        if options:  # some planners look at their values only when they are built
+            with make_problem(model, counter=Counter(1)) as problem, quiet_ompl():
+                spec.build(problem.space_information, 0)
+    except (PlannerUnavailable, MissingDependency):
+        pass
+    return options
 
 
 def _check_unique(kind: str, values: Sequence[Any]) -> None:

@@ -1,17 +1,25 @@
-"""The logs of OMPL's benchmark tool: one text file for each environment, which `ompl_benchmark_statistics` reads."""
+"""A comparison for OMPL's own tools: benchmark logs, one for each environment, and the database of Planner Arena."""
 
+import io
 import json
+import os
 import platform
+import sqlite3
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import redirect_stdout
 from datetime import datetime
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+from ompl.tools import computeViews, readBenchmarkLog
+
 from pbcs_ompl.core.plain import plain
-from pbcs_ompl.experiments.compare.run import Record, folder_of
-from pbcs_ompl.experiments.compare.sweep import Sweep
-from pbcs_ompl.results.folder import write_text
+from pbcs_ompl.experiments.planning_run import folder_of
+from pbcs_ompl.experiments.run import Record
+from pbcs_ompl.experiments.sweep import Sweep
+from pbcs_ompl.results.files import write_errors, write_text
 from pbcs_ompl.results.provenance import provenance
 
 STATUS = ("Unknown status", "Invalid start", "Invalid goal", "Unrecognized goal type", "Timeout",
@@ -33,6 +41,11 @@ PROGRESS = {"time REAL": "seconds", "transitions INTEGER": "transitions", "cover
 def write_logs(folder: Path, sweep: Sweep, records: Sequence[Record]) -> list[Path]:
     """Write a log for each environment into a folder, atomically, and return their paths.
 
+    Args:
+        folder: The folder.
+        sweep: What was compared.
+        records: Those of all runs that were made.
+
     Source of the grammar: OMPL, "Benchmarking", "The benchmark logfile format".
 
     Raises:
@@ -47,6 +60,30 @@ def write_logs(folder: Path, sweep: Sweep, records: Sequence[Record]) -> list[Pa
             lines += _planner(sweep, planner, [record for record in chosen if record["planner"] == planner])
         write_text(files[-1], "\n".join(lines) + "\n")
     return files
+
+
+def write_database(path: Path, logs: Sequence[Path]) -> None:
+    """Make the database from benchmark logs with OMPL's own reader, atomically; an older one is replaced.
+
+    Args:
+        path: The database.
+        logs: What `write_logs` returned.
+
+    Raises:
+        RunFolderError: the file cannot be written.
+    """
+    with write_errors(path):
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        os.close(handle)
+        try:
+            with redirect_stdout(io.StringIO()):  # it prints what it does
+                readBenchmarkLog(temporary, [str(log) for log in logs], False)
+                computeViews(temporary, False)
+            os.replace(temporary, path)
+        except sqlite3.OperationalError as error:
+            raise OSError(f"SQLite: {error}") from error
+        finally:
+            Path(temporary).unlink(missing_ok=True)
 
 
 def _preamble(sweep: Sweep, experiment: str, records: Sequence[Record]) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """Many seeds of one agent in one environment, as one stack: what the studies of chapters 4 and 6 run."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,8 +32,8 @@ class LoopSettings:
             that has not found the reward trains after each episode, as in [Matheron2020] 6.2.2.
         updates_per_transition: Gradient steps for each environment step.
         evaluate_every: Steps between two evaluations, a multiple of `block`.
-        patience: A seed that has passed so many evaluations in a row leaves the stack; 0 for never. The others go on as
-            they would have in the full stack.
+        patience: A seed that has passed this many evaluations in a row leaves the stack; 0 for never. The others train
+            as they would have in the full stack.
         expert_after: Steps after which the `expert` acts, if there is one ([Matheron2020] Fig. 6.2b).
 
     Raises:
@@ -70,8 +70,9 @@ class Curves:
         first_reward: The step of the first positive reward [S], counted from 1; -1 for never.
         rewarded: Share of transitions with a positive reward in the replay buffer at each evaluation [E, S], and so the
             expected share in mini-batches.
-        observed: What each observer said at each evaluation, by name [E, S].
-        left: The step after which each seed left, solved [S]; -1 where it stayed. In later rows it is as it was then.
+        observed: What each observer returned at each evaluation, by name [E, S].
+        solved_at: The step after which each seed left the stack, solved [S]; -1 where it stayed. Later rows repeat its
+            last numbers.
         ended: The steps that were made; less than asked for if all seeds left before.
     """
 
@@ -81,7 +82,7 @@ class Curves:
     first_reward: IndexArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     rewarded: list[Array] = field(default_factory=list)
     observed: dict[str, list[Array]] = field(default_factory=dict)
-    left: IndexArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    solved_at: IndexArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     ended: int = 0
 
     def summary(self) -> dict[str, object]:
@@ -89,11 +90,11 @@ class Curves:
         return {"seeds": list(self.seeds), "steps": self.steps, "success": np.array(self.success).astype(int).tolist(),
                 "first_reward": self.first_reward.tolist(), "rewarded": np.array(self.rewarded).tolist(),
                 "observed": {name: np.array(values).tolist() for name, values in self.observed.items()},
-                "left": self.left.tolist(), "ended": self.ended}
+                "solved_at": self.solved_at.tolist(), "ended": self.ended}
 
 
 class StackedTraining:
-    """Collect, remember, train, evaluate, for all seeds of `agent` together.
+    """Collect, train, evaluate, for all seeds of `agent` together.
 
     Each seed has a random stream of its own: a stack of S seeds does what S stacks of one do. `agent` is the stack of
     the `active` seeds, those that have not left.
@@ -103,7 +104,7 @@ class StackedTraining:
         agent: A stack of S agents.
         noise: How they explore; the actions are those of `agent.explore` before.
         expert: Actions [B, A] for states [B, D] that are tried instead after `expert_after` steps.
-        observers: Numbers to take down at each evaluation, by name.
+        observers: Numbers to record at each evaluation, by name.
 
     Source: [Matheron2020] 6.2.2. Differs: training comes after blocks of steps instead of after episodes, since seeds
     whose episodes differ in length train together; the policy is the same for all steps of a block.
@@ -122,7 +123,7 @@ class StackedTraining:
         self._passed = np.zeros(len(agent.seeds), dtype=np.int64)
         self._updates_due = 0.0
         never = np.full(len(agent.seeds), NEVER)
-        self.curves = Curves(agent.seeds, first_reward=never, left=never.copy(),
+        self.curves = Curves(agent.seeds, first_reward=never, solved_at=never.copy(),
                              observed={name: [] for name in self.observers})
 
     def run(self) -> Curves:
@@ -143,10 +144,10 @@ class StackedTraining:
                 self.agent.train(whole)
             if self.curves.ended % settings.evaluate_every == 0:
                 self._evaluate()
-                self._part_with_solved()
+                self._drop_solved_seeds()
 
     def _collect(self) -> None:
-        """Make a block of steps and remember them."""
+        """Make a block of steps and store them."""
         settings, model = self.settings, self.model
         shape = (settings.block, settings.copies)
         generators = [self._generators[index] for index in self.active]
@@ -197,12 +198,12 @@ class StackedTraining:
         row[self.active] = values
         rows.append(row)
 
-    def _part_with_solved(self) -> None:
+    def _drop_solved_seeds(self) -> None:
         """Let seeds that have passed `patience` evaluations in a row leave."""
         stays = self._passed[self.active] < self.settings.patience
         if self.settings.patience == 0 or stays.all():
             return
-        self.curves.left[self.active[~stays]] = self.curves.ended
+        self.curves.solved_at[self.active[~stays]] = self.curves.ended
         self.active = self.active[stays]
         if len(self.active):
             kept = np.flatnonzero(stays).tolist()
@@ -230,3 +231,45 @@ def solved(model: ResettableModel, agent: StackedAgent, starts: Array, max_steps
         if not running.any():
             break
     return success
+
+
+def chunks(seeds: int, size: int) -> Iterator[list[int]]:
+    """Yield the seeds 0, 1, ... in stacks of at most `size`."""
+    for first in range(0, seeds, size):
+        yield list(range(first, min(first + size, seeds)))
+
+
+def joined_success(records: Sequence[dict[str, Any]], steps: int, every: int) -> tuple[IndexArray, BoolArray]:
+    """Return when the seeds of all stacks were evaluated [E], and which were solved then [E, S].
+
+    A stack that ended early, all its seeds solved, counts as solved from then on.
+
+    Args:
+        records: Summaries of `Curves`.
+        steps, every: The settings that all of them have, `steps` and `evaluate_every`.
+    """
+    times = np.arange(0, steps + 1, every)
+    return times, joined_rows(records, "success", len(times)) > 0
+
+
+def joined_rows(records: Sequence[dict[str, Any]], name: str, count: int) -> Array:
+    """Return rows, such as "success" or "rewarded", of all stacks at `count` evaluations [E, S].
+
+    The last row of a stack that ended early is repeated.
+    """
+    return np.concatenate([_filled(record[name], count) for record in records], axis=1)
+
+
+def joined_first_rewards(records: Sequence[dict[str, Any]]) -> IndexArray:
+    """Return the step of the first reward of each seed [S]; -1 for never."""
+    return np.concatenate([np.array(record["first_reward"], dtype=np.int64) for record in records])
+
+
+def joined_observed(records: Sequence[dict[str, Any]], name: str) -> Array:
+    """Return what an observer returned at the end of each stack [S]."""
+    return np.concatenate([np.array(record["observed"][name][-1]) for record in records])
+
+
+def _filled(rows: list[list[float]], count: int) -> Array:
+    table = np.array(rows)
+    return np.concatenate([table, np.repeat(table[-1:], count - len(table), axis=0)])
