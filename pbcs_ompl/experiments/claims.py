@@ -59,7 +59,8 @@ def greater(claim: str, first: Mapping[Key, float], second: Mapping[Key, float],
     keys = [key for key in first if key in second]
     one, other = np.array([first[key] for key in keys]), np.array([second[key] for key in keys])
     enough = len(keys) >= FEWEST_PAIRS
-    p = float(wilcoxon(one, other, alternative="greater").pvalue) if enough and (one != other).any() else 1.0
+    test: Any = wilcoxon(one, other, alternative="greater") if enough and (one != other).any() else None
+    p = 1.0 if test is None else float(test.pvalue)
     medians = {f"median, {name}": float(np.median(values)) if keys else None
                for name, values in zip(names, (one, other), strict=True)}
     return Claim(f"{claim} (p < {SIGNIFICANCE})", p < SIGNIFICANCE if enough else None,

@@ -135,7 +135,8 @@ def _merge(sweep: Sweep, records: Mapping[str, Record], folder: Path | None) -> 
         chosen = [record for record in records.values() if folder_of(record) == sweep.folder(number)]
         grouped = _by_planner(sweep, chosen)
         label = {"environment": environment.label}
-        rows += [label | planner_row(planner, found, sweep.max_transitions) for planner, found in grouped.items() if found]
+        rows += [label | planner_row(planner, found, sweep.max_transitions)
+                 for planner, found in grouped.items() if found]
         tests += [label | test for test in sign_tests(grouped, sweep.max_transitions)]
         runs += [record for found in grouped.values() for record in found]
     for test, corrected in zip(tests, holm([test["p"] for test in tests]), strict=True):

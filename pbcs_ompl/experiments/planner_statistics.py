@@ -29,7 +29,7 @@ def planner_row(planner: str, records: Sequence[Record], max_transitions: int) -
         max_transitions: The budget of a run.
 
     Returns:
-        planner; solved, runs, failed (counts; a failed run has a reason and no measurements); wilson [low, high] (95 %);
+        planner; solved, runs, failed (counts; a failed run has a reason and no measurements); wilson [low, high], 95 %;
         transitions_median and transitions_quartiles; the medians of seconds (wall time of the search),
         collision_checks, path_length and coverage, None where no run has them; reason: why the first failed run failed.
     """

@@ -127,7 +127,7 @@ def _sweep(folder: Path) -> dict[str, Any]:
 
 
 def _load(path: Path, *functions: str) -> ModuleType:
-    """Import a script of a study, under a name of its own where it is not in the package; it must have these functions."""
+    """Import a script of a study, which must have these functions; under a name of its own outside of the package."""
     if path.parent.parent == STUDIES:
         return import_module(f"pbcs_ompl.experiments.studies.{path.parent.name}.{path.stem}")
     name = f"pbcs_study_{path.resolve().parent.name}_{path.stem}".replace("-", "_")

@@ -1,4 +1,4 @@
-"""One training as a study records it: a budget that ends first is a result too."""
+"""One training as a study records it, solved or not."""
 
 import time
 from typing import Any
@@ -12,9 +12,11 @@ def trained(env: str, env_kwargs: dict[str, Any], **options: Any) -> tuple[dict[
     """Train, and return a record of plain values beside the result.
 
     The record is the summary of the result with `env_kwargs`, `transitions` (planning and training), `cpu_seconds` of
-    the same, and `arrives`: whether what was learnt by the end, complete or not, reaches the target once without noise.
+    the same, and `succeeds`: whether the chain at the end, complete or not, reaches the goal once without noise.
 
     Args:
+        env: The id of an environment.
+        env_kwargs: Its options.
         options: Those of `pbcs_ompl.train`.
 
     Raises:
@@ -26,7 +28,8 @@ def trained(env: str, env_kwargs: dict[str, Any], **options: Any) -> tuple[dict[
     except TrainingStalled as stalled:
         result = stalled.result
     spent = time.process_time() - began
-    arrives = result.chain is not None and evaluate(result.chain, make(env, env_kwargs), episodes=1).success_rate == 1.0
-    record = result.summary() | {"env_kwargs": env_kwargs, "cpu_seconds": spent, "arrives": arrives,
+    evaluation = None if result.chain is None else evaluate(result.chain, make(env, env_kwargs), episodes=1)
+    succeeds = evaluation is not None and evaluation.success_rate == 1.0
+    record = result.summary() | {"env_kwargs": env_kwargs, "cpu_seconds": spent, "succeeds": succeeds,
                                  "transitions": result.plan_transitions + result.train_transitions}
     return record, result

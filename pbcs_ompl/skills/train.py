@@ -15,11 +15,10 @@ from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
-from pbcs_ompl.results.files import CONFIG, RESULT, read_toml
+from pbcs_ompl.results.files import CHECKPOINT, CONFIG, RESULT, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.config import TrainConfig
 from pbcs_ompl.skills.result import TrainResult
-from pbcs_ompl.results.files import CHECKPOINT
 from pbcs_ompl.skills.training import Training
 
 

@@ -12,10 +12,9 @@ from pathlib import Path
 
 from pbcs_ompl.bridge.coverage import log_spaced
 from pbcs_ompl.experiments.compare import read_comparison
-from pbcs_ompl.experiments.planner_arena import write_logs
-from pbcs_ompl.experiments.planner_arena import write_database
-from pbcs_ompl.experiments.records import record_file
+from pbcs_ompl.experiments.planner_arena import write_database, write_logs
 from pbcs_ompl.experiments.planning_run import Job, broken
+from pbcs_ompl.experiments.records import record_file
 from pbcs_ompl.experiments.sweep import Sweep, make_sweep
 from pbcs_ompl.results.files import CONFIG, to_toml, write_text
 from pbcs_ompl.results.report import write_report

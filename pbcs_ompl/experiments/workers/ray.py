@@ -89,7 +89,8 @@ def _ray() -> ModuleType:
         import ray
     except ModuleNotFoundError as error:
         raise MissingDependency("the executor ray needs Ray: pip install 'pbcs-ompl[ray]'") from error
-    return ray
+    module: ModuleType = ray
+    return module
 
 
 @contextmanager

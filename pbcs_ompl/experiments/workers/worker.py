@@ -21,7 +21,7 @@ from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
 SECONDS_BETWEEN_POLLS = 0.1
 """How often the memory of a worker is measured; the system does not report when it grows."""
 IDLE_MEMORY_FRACTION = 0.5
-"""A worker that holds more than this share of its limit between two runs is replaced, so that each run has most of it."""
+"""A worker that holds more than this share of its limit between two runs is replaced: each run has the rest of it."""
 SHUTDOWN_TIMEOUT = 5.0
 """Seconds within which an idle process has to end by itself."""
 READY = None

@@ -31,7 +31,7 @@ class Report(NamedTuple):
     sections: list[Section]
 
     def summary(self) -> dict[str, Any]:
-        """Return plain values: `out`, `folders` with their kinds and outcomes, and what is `damaged` with the reasons."""
+        """Return plain values: `out`, `folders` with their kinds and outcomes, the reasons of `damaged` ones."""
         folders = [{"folder": section.name, "kind": section.kind, "outcome": section.content.outcome}
                    for section in self.sections]
         damaged = {section.name: reason for section in self.sections if section.kind == DAMAGED

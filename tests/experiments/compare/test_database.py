@@ -8,8 +8,7 @@ import pytest
 from ompl.tools import readBenchmarkLog
 
 from pbcs_ompl.core.errors import RunFolderError
-from pbcs_ompl.experiments.planner_arena import write_logs
-from pbcs_ompl.experiments.planner_arena import write_database
+from pbcs_ompl.experiments.planner_arena import write_database, write_logs
 from pbcs_ompl.experiments.planning_run import broken
 from pbcs_ompl.experiments.sweep import make_sweep
 

@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pbcs_ompl.experiments.planning_run import Job, broken
 from pbcs_ompl.experiments.planner_statistics import row
+from pbcs_ompl.experiments.planning_run import Job, broken
 
 JOB = Job("1-Maze-v0/P-0", "P", 0, "env", {}, {}, 1000, None)
 

@@ -12,9 +12,8 @@ import pytest
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
-from pbcs_ompl.experiments.run_study import run_study
+from pbcs_ompl.experiments.run_study import open_study, run_study
 from pbcs_ompl.experiments.study import find_study
-from pbcs_ompl.experiments.run_study import open_study
 
 RUNS, KILLS = 120, 8
 SCRIPT = f'''

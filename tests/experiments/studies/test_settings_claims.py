@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from pbcs_ompl.experiments.study import find_study
 from pbcs_ompl.experiments.claims import greater
+from pbcs_ompl.experiments.study import find_study
 
 USUAL = {"alpha": 3, "beta": 50, "radius": 0.1}
 VALUES = {"alpha": [1, 3, 10], "beta": [5, 50, 100], "radius": [0.05, 0.1, 0.2]}

@@ -6,8 +6,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from pbcs_ompl.experiments.study import find_study, study_ids
 from pbcs_ompl.experiments.studies.toy_analysis.random_walk import found_by
+from pbcs_ompl.experiments.study import find_study, study_ids
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.files import to_toml
 

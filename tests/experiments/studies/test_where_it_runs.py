@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.experiments.run import Shard
 from pbcs_ompl.experiments.run_study import run_shard, run_study
 from pbcs_ompl.experiments.study import find_study
-from pbcs_ompl.experiments.run import Shard
 from pbcs_ompl.experiments.workers.schedulers import LARGEST_ARRAY, slurm_script
 
 SCRIPT = '''

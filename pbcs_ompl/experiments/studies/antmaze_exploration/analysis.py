@@ -7,9 +7,8 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from scipy.stats import mannwhitneyu
 
+from pbcs_ompl.experiments.claims import FEWEST_PAIRS, SIGNIFICANCE, Claim, rate
 from pbcs_ompl.experiments.planner_statistics import censored
-from pbcs_ompl.experiments.claims import Claim, rate
-from pbcs_ompl.experiments.claims import FEWEST_PAIRS, SIGNIFICANCE
 from pbcs_ompl.figures.canvas import save
 from pbcs_ompl.figures.compare import distribution_figure
 from pbcs_ompl.figures.maze import stage

@@ -38,7 +38,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _alone(settings: dict[str, Any]) -> dict[str, Any]:
-    """Train DDPG alone from the sparse reward; count its visits and take down when it meets the reward first."""
+    """Train DDPG alone from the sparse reward; count its visits and record when it meets the reward first."""
     model, steps = make("pbcs/Maze-v0", MAZE), settings["steps"]
     agent = DDPG(model.observation_size, model.action_low, model.action_high, seeds=settings["seeds"],
                  settings=DDPGSettings.from_preset(settings["preset"], discount=settings["discount"]))
@@ -48,5 +48,6 @@ def _alone(settings: dict[str, Any]) -> dict[str, Any]:
     # The maze's observations are its states.
     visited = training.agent.state_dict([0])["replay/rows"][0, :, :model.observation_size]
     edges = [np.linspace(low, high, BINS + 1) for low, high in zip(model.state_low, model.state_high, strict=True)]
-    visits, *_ = np.histogram2d(*visited.T, bins=edges)
+    x, y = visited.T
+    visits, *_ = np.histogram2d(x, y, bins=edges)
     return {**settings, "first_reward": curves.first_reward.tolist(), "visits": visits.astype(int).tolist()}

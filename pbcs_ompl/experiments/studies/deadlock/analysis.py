@@ -209,13 +209,14 @@ def _draw(variants: dict[str, Variant], drift: dict[str, Any] | None, figures: P
     _draw_rewarded(variants, figures)
     if drift is not None:
         panels = {"max |Q|": np.array(drift["largest_value"]), "max |π|": np.array(drift["largest_action"])}
-        save(curves_figure(np.array(drift["updates"]), panels, title="Drift: no reward at all (Fig. 6.4)"),
-             figures / "drift.png")
+        updates = np.array(drift["updates"], dtype=np.float64)
+        save(curves_figure(updates, panels, title="Drift: no reward at all (Fig. 6.4)"), figures / "drift.png")
     for name, (chosen, failed) in _failed_with_reward(variants).items():
         observed = [record["observed"] for record in chosen.records]
         panels = {title: joined_rows(observed, key, len(chosen.steps))[:, failed] for key, title in OBSERVED.items()}
         title = f"{name}: failed seeds that have met the reward"
-        save(curves_figure(chosen.steps, panels, xlabel="steps", title=title), figures / f"diagnostics-{name}.png")
+        save(curves_figure(chosen.steps.astype(np.float64), panels, xlabel="steps", title=title),
+             figures / f"diagnostics-{name}.png")
         seeds = np.concatenate([record["seeds"] for record in chosen.records])[failed]
         one = next((part for record in chosen.records for part in record["critics"] if part["seed"] in seeds), None)
         if one is not None:
@@ -262,7 +263,8 @@ def _draw_rewarded(variants: dict[str, Variant], figures: Path) -> None:
     panels = {f"failed, {name}": MINI_BATCHES * joined_rows(chosen.records, "rewarded", len(chosen.steps))[:, rows]
               for name, (chosen, rows) in failed.items()}
     for chosen, _ in list(failed.values())[:1]:
-        save(curves_figure(chosen.steps, panels, xlabel="steps", title=title), figures / "rewarded.png")
+        save(curves_figure(chosen.steps.astype(np.float64), panels, xlabel="steps", title=title),
+             figures / "rewarded.png")
 
 
 def _draw_critic(name: str, one: dict[str, Any], figures: Path) -> None:

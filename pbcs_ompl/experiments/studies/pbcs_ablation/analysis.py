@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.claims import Claim, rate
-from pbcs_ompl.experiments.claims import greater
+from pbcs_ompl.experiments.claims import Claim, greater, rate
 from pbcs_ompl.figures.by_group import rates_figure, values_figure
 from pbcs_ompl.figures.canvas import save
 

@@ -29,7 +29,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     if settings["kind"] == "agents":
         return _agents(settings)
     share, steps = Fraction(settings["share"]), settings["steps"]
-    exact, total, pictures = [], Fraction(0), {}
+    exact, total, pictures, masses = [], Fraction(0), {}, []
     for step, density in enumerate(densities(steps, share), start=1):
         total += density.found
         exact.append(float(total))
