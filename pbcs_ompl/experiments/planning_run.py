@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from pbcs_ompl.bridge.coverage import Coverage
-from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.bridge.result import PlanResult
+from pbcs_ompl.bridge.plan import PlanResult, plan
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.experiments.run import Failure, Record, Run
 
 MEASURED = ("transitions", "collision_checks", "seconds", "nodes", "path_length", "replay_ok", "memory", "coverage",
-            "progress")
+            "progress", "planner_settings")
 """What the record of a run has beside what identifies it (see docs/compare.md); None in a run that failed."""
 IDENTITY = ("planner", "seed", "environment")
 WARM_UP_TRANSITIONS = 64
@@ -37,7 +36,7 @@ def run_planner(run: Run) -> Record:
     reason = None if result.solved else "the budget ended before the goal was reached"
     measured = {name: value for name, value in result.summary().items() if name in MEASURED}
     return {**_identity(run), "solved": result.solved, **measured, "memory": _peak_megabytes(),
-            **_coverage(result.coverage), "reason": reason}
+            **_coverage(result.coverage), "planner_settings": result.planner_settings, "reason": reason}
 
 
 def failed_record(run: Run, failure: Failure) -> Record:

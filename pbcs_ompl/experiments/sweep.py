@@ -1,5 +1,6 @@
 """What is compared: planners x environments x seeds, and the budget of one run."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,6 +14,7 @@ from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, PlannerUnavailable
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import quiet_ompl
+from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.types import Counter
 from pbcs_ompl.experiments.run import Run
 from pbcs_ompl.resettable import make
@@ -29,7 +31,7 @@ class Sweep:
     """Planners x environments x seeds, checked.
 
     Attributes:
-        planners: The options of each planner, by its name.
+        planners: The options of each planner, defaults included, by its name.
         environments: Each with a label of its own.
         seeds: The seeds.
         max_transitions, max_seconds, max_memory: The budget of one run; None for any.
@@ -142,19 +144,28 @@ def _spec(env: Environment, options: Options, goal: str | None, feature: str | N
 
 
 def _resolved(planner: str, options: Options, model: ResettableModel) -> Options:
-    """Return the options of a planner. A planner that cannot be built here is left to its runs, which fail.
+    """Return all options of a planner, defaults included, but for those that it takes from the environment.
+
+    A planner that cannot be built here keeps the given ones, and its runs fail.
 
     Raises:
         UnknownName, InvalidOption: there is no such planner or option, or the planner refuses a value.
     """
     try:
         spec = PlannerSpec(planner, options)
-        if options:  # some planners look at their values only when they are built
-            with make_problem(model, counter=Counter(1)) as problem, quiet_ompl():
-                spec.build(problem.space_information, 0)
+        with make_problem(model, counter=Counter(1)) as problem, quiet_ompl():
+            settings = spec.settings(spec.build(problem.space_information, 0))
     except (PlannerUnavailable, MissingDependency):
-        pass
-    return options
+        return options
+    return {name: value for name, value in settings.items() if name in options or _is_plain(value)}
+
+
+def _is_plain(value: Any) -> bool:
+    try:
+        json.dumps(value, default=plain)
+    except TypeError:
+        return False
+    return True
 
 
 def _check_unique(kind: str, values: Sequence[Any]) -> None:
