@@ -23,7 +23,7 @@ from pbcs_ompl.results.folder import open_run, read_config
 
 DATABASE = "comparison.db"
 SECONDS_OF_GRACE = 20.0
-"""A run may take so much longer than its budget of seconds, to build, warm up and replay, before it is killed."""
+"""How much longer than its budget of seconds a run may take, to build, warm up and replay, before it is killed."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,8 @@ def records(sweep):
     made = []
     for number, run in enumerate(sweep.runs(), start=1):
         record = {**failed_record(run, Failure("")), "solved": True, "transitions": 50 + number,
-                  "collision_checks": 60 + number, "seconds": 0.5 * number, "nodes": 20, "path_length": 7, "replay_ok": True, "memory": 100.5,
+                  "collision_checks": 60 + number, "seconds": 0.5 * number, "nodes": 20, "path_length": 7,
+                  "replay_ok": True, "memory": 100.5,
                   "coverage": 0.25, "progress": {"transitions": [1, 50], "seconds": [1e-7, 0.5 * number],
                                                  "coverage": [0.125, 0.25]}, "reason": None}
         unsolved = {**record, "solved": False, "path_length": None, "replay_ok": None}
@@ -63,7 +64,7 @@ def test_columns_planner_arena_relies_on(database):
     assert columns(database, "progress") == ["runid", "time", "transitions", "coverage"]
 
 
-def test_every_number_of_every_record_arrives(database, records):
+def test_every_number_of_every_record_is_in_the_database(database, records):
     names = ["time", "memory", "solved", *OURS, "correct_solution", "solution_length", "graph_states"]
     found = database.execute("SELECT x.name, p.name, e.description, " + ", ".join(f"r.{name}" for name in names) +
                              " FROM runs r JOIN plannerConfigs p ON p.id = r.plannerid "

@@ -52,7 +52,7 @@ def test_failed_runs_have_no_seconds_and_say_why():
 
 
 def records(outcomes):
-    """Return a record for each seed: solved with so many transitions, or None for unsolved."""
+    """Return a record for each seed: solved with this many transitions, or None for unsolved."""
     return [{"seed": seed, "solved": needed is not None, "transitions": BUDGET if needed is None else needed,
              "seconds": 1.0} for seed, needed in enumerate(outcomes)]
 

@@ -89,7 +89,7 @@ def test_a_second_process_is_kept_out_of_the_folder(folder, tmp_path, capsys):
             run_study(study, out=tmp_path / "out")
         assert main(["study", str(folder), "--out", str(tmp_path / "out")]) == 2
         assert main(["study", str(folder), "--out", str(tmp_path / "out"), "--shard", "1/2"]) == 2
-    assert capsys.readouterr().err.count("is in use by another process; wait for its end") == 2
+    assert capsys.readouterr().err.count("is in use by another process; wait until it ends") == 2
 
 
 @pytest.mark.parametrize("damage", ['{"seed": 0, "wa', "", "[1]", "null"])

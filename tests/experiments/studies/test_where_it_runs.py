@@ -134,7 +134,7 @@ def test_limits_of_a_run_come_from_outside(folder, study):
     (folder / "study.py").write_text(SCRIPT.replace("    with open", "    __import__('time').sleep(9)\n    with open"))
     status, said = study("--seeds 1 --max-seconds 0.5")
     assert status == 2
-    assert "stopped from outside after 0.5 s" in said
+    assert "killed after 0.5 s" in said
 
 
 def test_the_makefile_makes_each_run_once_and_then_the_analysis(folder, study, tmp_path):

@@ -51,7 +51,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
 
 def _episode(model: ResettableModel, actor: Policy, start: int, noise: float, rng: np.random.Generator,
              agent: StackedAgent | None) -> float:
-    """Run an episode from `reset(seed=start)`, which `agent` remembers, and return its return."""
+    """Run an episode from `reset(seed=start)`, which `agent` stores, and return its return."""
     low, high = model.action_low, model.action_high
     state = model.initial_state(start)[None]
     parts: list[tuple[Array, ...]] = []

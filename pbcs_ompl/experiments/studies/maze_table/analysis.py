@@ -19,7 +19,7 @@ ALONE = ("DDPG", "TD3")
 BARS = (((2, 3, 4, 5, 7), 0.95, "[Matheron2020] 7.4: PBCS solves mazes up to 7x7; the bar is ours"),
         ((10, 15), 0.8, "ours: beyond [Matheron2020]"))
 MILLION = 1_000_000
-"""[Matheron2020] 5.6: a run succeeds within so many transitions, planning included."""
+"""[Matheron2020] 5.6: a run has to succeed within this many transitions, planning included."""
 COLOURS = {True: "#e3f4e3", False: "#fbe3e3"}
 """Backgrounds of solved and unsolved pictures, as in Fig. 7.3."""
 

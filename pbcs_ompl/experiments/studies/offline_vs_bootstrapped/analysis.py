@@ -73,7 +73,7 @@ def _little_of_the_wall(record: dict[str, Any], figures: Path) -> Claim:
     _draw_mini_batch(record, figures)
     count = record["explored"] * len(record["seeds"])
     inside = rate(sum(record["stopped_inside"]), count)
-    return Claim("at most one in twenty of Ex's transitions tells of the inner wall of the 2x2 maze",
+    return Claim("at most one in twenty of Ex's transitions shows the inner wall of the 2x2 maze",
                  inside["rate"] <= 0.05, {"stopped by the inner wall": inside,
                                           "stopped by any wall": rate(sum(record["stopped"]), count)},
                  "[Matheron2020] 4.7, Fig. 4.7", "what can be learnt from them all the same: see offline DDPG")

@@ -18,7 +18,8 @@ def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
     tasks = {task: [record for record in records if record["task"] == task]
              for task in dict.fromkeys(record["task"] for record in records)}
     solved = {task: rate(sum(record["solved"] for record in chosen), len(chosen)) for task, chosen in tasks.items()}
-    _draw(solved, tasks, figures / "solved.png")
+    if records:
+        _draw(solved, tasks, figures / "solved.png")
     alone = [_most_seeds(task, solved[task], chosen) for task, chosen in tasks.items() if not task.endswith(LEARNT)]
     pairs = [_learnt(task, solved, tasks) for task in tasks if task + LEARNT in tasks]
     return [*alone, *pairs]

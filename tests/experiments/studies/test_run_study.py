@@ -1,4 +1,4 @@
-"""A study runs each run once, survives whatever happens to one of them, and goes on where it was stopped."""
+"""A study runs each run once, survives whatever happens to one of them, and is resumed where it was stopped."""
 
 import json
 import os
@@ -87,12 +87,12 @@ def test_a_run_that_dies_or_raises_costs_only_itself_and_is_tried_again(folder, 
     assert result.failed["coin-2"] == "no coin"
     for name in result.failed:
         (folder / name).unlink()
-    mended = run_study(find_study(str(folder)), out=tmp_path / "out", seeds=5)
-    assert (len(mended.records), mended.failed) == (5, {})
+    again = run_study(find_study(str(folder)), out=tmp_path / "out", seeds=5)
+    assert (len(again.records), again.failed) == (5, {})
     assert log(folder).count("coin-4") == 1
 
 
-def test_a_killed_study_goes_on(folder, tmp_path):
+def test_a_killed_study_is_resumed(folder, tmp_path):
     (folder / "coin-2").write_text("wait")
     command = [sys.executable, "-m", "pbcs_ompl.cli", "study", str(folder), "--out", str(tmp_path / "out")]
     child = subprocess.Popen(command, start_new_session=True)
@@ -121,7 +121,7 @@ def test_mistakes_are_named(folder, tmp_path):
     with pytest.raises(DamagedFile, match=r"coin-0\.json"):
         run_study(study, out=tmp_path / "out")
     (folder / "coin-0").write_text("raise")
-    with pytest.raises(PbcsError, match="no run of coin-toss came to an end; coin-0: ZeroDivisionError"):
+    with pytest.raises(PbcsError, match="all runs of coin-toss failed; coin-0: ZeroDivisionError"):
         run_study(study, out=tmp_path / "other", seeds=1)
 
 

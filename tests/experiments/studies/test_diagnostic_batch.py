@@ -5,7 +5,7 @@ import pytest
 
 from pbcs_ompl.agents import DDPG, DDPGSettings
 from pbcs_ompl.core.errors import InvalidState
-from pbcs_ompl.experiments.diagnostic_batch import Probe, sample_states
+from pbcs_ompl.experiments.diagnostic_batch import DiagnosticBatch, sample_states
 from pbcs_ompl.experiments.stacked_training import chunks, joined_first_rewards, joined_observed, joined_success
 from pbcs_ompl.resettable import make
 
@@ -46,7 +46,7 @@ def test_observers_give_each_seed_what_it_gets_alone():
 
     def observed(seeds):
         agent = DDPG(1, model.action_low, model.action_high, seeds=seeds, settings=DDPGSettings(hidden=(8,)))
-        return {name: observer(agent) for name, observer in Probe(model).observers().items()}
+        return {name: observer(agent) for name, observer in DiagnosticBatch(model).observers().items()}
 
     together, alone = observed((1, 2)), observed((2,))
     for name, values in together.items():
