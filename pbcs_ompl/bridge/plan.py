@@ -27,11 +27,9 @@ from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
-from pbcs_ompl.results.folder import CONFIG, PROVENANCE, RESULT, RunFolder
+from pbcs_ompl.results.files import CONFIG, PROVENANCE, RESULT, TRAJECTORY, TREE
+from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.results.provenance import planning_versions
-
-TRAJECTORY = "trajectory.npz"
-TREE = "tree.npz"
 
 
 @dataclass(frozen=True, eq=False)

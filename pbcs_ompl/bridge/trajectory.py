@@ -13,7 +13,7 @@ from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import path_control, value_reader
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.results.folder import read_arrays, write_arrays
+from pbcs_ompl.results.files import read_arrays, write_arrays
 from pbcs_ompl.results.provenance import environment_versions
 
 FORMAT = 2

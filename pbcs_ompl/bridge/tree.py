@@ -11,7 +11,7 @@ from pbcs_ompl.bridge.planner_spec import as_batch_planner
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.ompl_access import real_dimension, value_reader
 from pbcs_ompl.core.tree import Tree
-from pbcs_ompl.results.folder import read_arrays, write_arrays
+from pbcs_ompl.results.files import read_arrays, write_arrays
 
 
 def tree_of(planner: Any, space_information: Any) -> Tree:

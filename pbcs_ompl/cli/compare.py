@@ -1,6 +1,5 @@
 """`pbcs compare`: planners x environments x seeds, as a table, pictures and a Planner Arena database."""
 
-import shlex
 from argparse import Namespace
 from itertools import groupby
 from pathlib import Path
@@ -13,6 +12,7 @@ from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
 from pbcs_ompl.core.formatting import duration, short
 from pbcs_ompl.experiments.compare import compare
+from pbcs_ompl.results.command_line import command, report_words
 
 HEADER = f"{'solved':<10}{'95 % interval':<17}{'transitions':<15}{'seconds':<10}(medians)"
 
@@ -62,7 +62,7 @@ def _closing_lines(summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
         lines += [("", _failure(row)) for row in chosen if row["failed"]]
         lines += [("pair", _pair(test)) for test in summary["tests"] if test["environment"] == place]
     return [*lines, ("files", list_files(out)),
-            ("next", f"pbcs report {shlex.quote(str(out))}"),
+            ("next", command(report_words(out))),
             ("", f"DATABASE={summary['database']} plannerarena   (pip install 'pbcs-ompl[arena]')")]
 
 

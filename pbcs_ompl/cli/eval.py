@@ -9,10 +9,11 @@ from pbcs_ompl.cli.terminal import print_summary
 from pbcs_ompl.core.formatting import percent, short
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
+from pbcs_ompl.results.command_line import command, eval_words
+from pbcs_ompl.results.files import CHAIN
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.evaluation import evaluate
-from pbcs_ompl.skills.training import CHAIN
 
 
 def run(arguments: Namespace) -> int:
@@ -45,5 +46,5 @@ def _closing_lines(arguments: Namespace, summary: dict[str, Any]) -> list[tuple[
     if arguments.video:
         lines.append(("video", arguments.video))
     if not arguments.epsilon:
-        lines.append(("next", f"pbcs eval {arguments.dir} --epsilon 0.1"))
+        lines.append(("next", command(eval_words(arguments.dir, epsilon=0.1))))
     return lines

@@ -1,6 +1,5 @@
 """`pbcs plan`: search a trajectory to the goal, draw the tree."""
 
-import shlex
 from argparse import Namespace
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.formatting import duration, short
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.command_words import environment_words
+from pbcs_ompl.results.command_line import command, environment_words
 
 
 def run(arguments: Namespace) -> int:
@@ -42,7 +41,7 @@ def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[
         replay = "replays exactly" if result.replay_ok else "DOES NOT REPLAY (not deterministic?)"
         lines.append(("path", f"{short(result.path_length)} steps, {replay}"))
         words = environment_words(environment(arguments))
-        following = shlex.join(["pbcs", "train", *words, "--path", str(out)])
+        following = command(["train", *words, "--path", str(out)])
     else:
         following = "the same with a larger --max-transitions or --max-seconds, or another --planner"
     return [*lines, ("files", list_files(out)), ("next", following)]

@@ -1,6 +1,5 @@
 """`pbcs study`: run an experiment, draw its figures, say which of its claims the data agree with."""
 
-import shlex
 import sys
 from argparse import Namespace
 from pathlib import Path
@@ -11,21 +10,24 @@ from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import in_words
-from pbcs_ompl.experiments.study import Study, find_study, run_shard, run_study, study_ids
-from pbcs_ompl.experiments.study.execute import open_study
-from pbcs_ompl.experiments.study.runs import record_name, run_settings
-from pbcs_ompl.experiments.workers import Shard
+from pbcs_ompl.experiments.records import record_file
+from pbcs_ompl.experiments.run import Shard
+from pbcs_ompl.experiments.run_study import open_study, run_shard, run_study
+from pbcs_ompl.experiments.study import Study, find_study, study_ids
 from pbcs_ompl.experiments.workers.schedulers import makefile, slurm_script
-from pbcs_ompl.results.folder import write_text
+from pbcs_ompl.results.command_line import command, report_words, study_words
+from pbcs_ompl.results.files import write_text
 
 VERDICTS = {True: "agrees", False: "DIFFERS", None: "no data"}
 
 
 def run(arguments: Namespace) -> int:
-    """Run, analyse, report. Returns 1 when a run failed; claims that are false are an answer, not a failure."""
+    """Run, analyse, report. Returns 1 when a run failed; claims that are false are results, not failures."""
     if arguments.list:
         titles = study_ids()
-        print_summary({"studies": titles}, list(titles.items()), as_json=arguments.json)
+        width = max(map(len, titles))
+        print_summary({"studies": titles}, [(f"{name:<{width}}", title) for name, title in titles.items()],
+                      as_json=arguments.json)
         return 0
     if arguments.id is None:
         raise InvalidOption("the id of a study is missing; pbcs study --list shows them all")
@@ -44,44 +46,43 @@ def run(arguments: Namespace) -> int:
 
 
 def _make(study: Study, arguments: Namespace, out: Path) -> int:
-    """Make the runs, all of them or those of a shard, and say what came of them."""
-    settings = run_settings(study, arguments.seeds)
+    """Make the runs, all of them or those of a shard, and print the result."""
+    runs = study.all_runs(arguments.seeds)
     shard = None if arguments.shard is None else Shard(*arguments.shard)
-    budget = len(settings if shard is None else shard.of(settings))
+    budget = len(runs if shard is None else shard.of(runs))
     with executor(arguments) as jobs, ProgressDisplay(study.id, count="runs", budget=budget) as display:
         options = {"out": out, "seeds": arguments.seeds, "jobs": jobs, "max_seconds": arguments.max_seconds,
                    "max_memory": arguments.max_memory, "on_progress": display}
         if shard is None:
-            result = run_study(study, **options)
-            summary, failed = result.summary(), result.failed
+            summary = run_study(study, **options).summary()
             lines = _closing_lines(study.title, summary, out)
         else:
-            records, failed = run_shard(study, shard, **options)
-            summary = {"id": study.id, "shard": str(shard), "runs": len(records), "failed": failed,
-                       "out": str(out)}
+            records, failures = run_shard(study, shard, **options)
+            failed = {name: failure.reason for name, failure in failures.items()}
+            summary = {"id": study.id, "shard": str(shard), "runs": len(records), "failed": failed, "out": str(out)}
             lines = [(study.id, f"shard {shard}: {len(records)} of {budget} runs"), *_failures(failed),
                      ("next", "the other shards, then the same command without --shard")]
     print_summary(summary, lines, as_json=arguments.json)
-    return 1 if failed else 0
+    return 1 if summary["failed"] else 0
 
 
 def _emit(study: Study, arguments: Namespace, out: Path) -> int:
     """Write the runs for a scheduler."""
     limits = [("--max-seconds", arguments.max_seconds), ("--max-memory", arguments.max_memory)]
-    device = [] if arguments.device is None else ["--device", arguments.device]
-    command = [sys.executable, "-m", "pbcs_ompl.cli", "study", str(study.folder.resolve()),
-               "--seeds", str(arguments.seeds), "--out", str(out.resolve()), *device,
-               *(word for option, limit in limits if limit is not None for word in (option, f"{limit:g}"))]
-    settings = run_settings(study, arguments.seeds)
+    words = study_words(study.folder.resolve(), seeds=arguments.seeds, device=arguments.device)
+    whole = [sys.executable, "-m", "pbcs_ompl.cli", *words, "--out", str(out.resolve()),
+             *(word for option, limit in limits if limit is not None for word in (option, f"{limit:g}"))]
+    runs = study.all_runs(arguments.seeds)
     with open_study(study, out, arguments.seeds):
         if arguments.emit == "make":
             file, following = out / "Makefile", f"make -C {out} --jobs 2 --keep-going"
-            write_text(file, makefile(command, [record_name(one) for one in settings]))
+            records = [str(record_file(out, run.name).relative_to(out)) for run in runs]
+            write_text(file, makefile(whole, records))
         else:
             file, following = out / "slurm.sh", f"sbatch {out / 'slurm.sh'}"
-            write_text(file, slurm_script(command, len(settings), study.id, out.resolve()))
-    print_summary({"id": study.id, "runs": len(settings), "out": str(out), "file": str(file)},
-             [(study.id, f"{len(settings)} runs in {file}"), ("next", following)], as_json=arguments.json)
+            write_text(file, slurm_script(whole, len(runs), study.id, out.resolve()))
+    print_summary({"id": study.id, "runs": len(runs), "out": str(out), "file": str(file)},
+                  [(study.id, f"{len(runs)} runs in {file}"), ("next", following)], as_json=arguments.json)
     return 0
 
 
@@ -97,4 +98,4 @@ def _closing_lines(title: str, summary: dict[str, Any], out: Path) -> list[tuple
         lines += [("", claim["note"])] if claim["note"] else []
     lines += _failures(summary["failed"])
     return [*lines, ("figures", ", ".join(summary["figures"]) or "none"), ("files", list_files(out)),
-            ("next", f"pbcs report {shlex.quote(str(out))}")]
+            ("next", command(report_words(out)))]

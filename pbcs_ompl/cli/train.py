@@ -1,10 +1,8 @@
 """`pbcs train`: plan a trajectory, train a chain of skills along it, draw both."""
 
-import shlex
 from argparse import Namespace
 from pathlib import Path
 
-from pbcs_ompl.bridge.plan import TRAJECTORY
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.cli.arguments import build_parser, environment
 from pbcs_ompl.cli.folders import fresh_folder
@@ -13,7 +11,8 @@ from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary, w
 from pbcs_ompl.core.errors import InvalidOption, TrainingStalled
 from pbcs_ompl.core.formatting import duration, percent, short
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import CONFIG
+from pbcs_ompl.results.command_line import command, eval_words, resume_words
+from pbcs_ompl.results.files import CONFIG, TRAJECTORY
 from pbcs_ompl.skills import TrainResult, resume, train
 
 
@@ -33,7 +32,7 @@ def run(arguments: Namespace) -> int:
         result = error.result
     except KeyboardInterrupt:
         if (out / CONFIG).is_file():
-            raise KeyboardInterrupt(f"continue with: pbcs train --resume {shlex.quote(str(out))}") from None
+            raise KeyboardInterrupt(f"continue with: {command(resume_words(out))}") from None
         raise
     _draw(result, out)
     print_summary(result.summary(), _closing_lines(result, out), as_json=arguments.json)
@@ -90,7 +89,6 @@ def _closing_lines(result: TrainResult, out: Path) -> list[tuple[str, str]]:
         rate = percent(result.robust.success_rate, result.robust.wilson)
         lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions"))
     lines.append(("files", list_files(out)))
-    folder = shlex.quote(str(out))
     if result.stalled is None:
-        return [*lines, ("next", f"pbcs eval {folder} --epsilon 0.2")]
-    return [*lines, ("next", f"pbcs train --resume {folder} --max-transitions N, with a larger N")]
+        return [*lines, ("next", command(eval_words(out, epsilon=0.2)))]
+    return [*lines, ("next", f"{command(resume_words(out))} --max-transitions N, with a larger N")]

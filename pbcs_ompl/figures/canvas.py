@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from pbcs_ompl.results.folder import write_atomically
+from pbcs_ompl.results.files import write_atomically
 
 RED, GREEN, PURPLE, WALL = "#d62728", "#2ca02c", "#8e44ad", "#3b3b3b"
 

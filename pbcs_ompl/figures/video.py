@@ -13,7 +13,7 @@ from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.rendering import check_can_render
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import write_atomically
+from pbcs_ompl.results.files import write_atomically
 
 KINDS = (".mp4", ".gif")
 FRAMES_A_SECOND = 30

@@ -1,25 +1,30 @@
-"""A result folder: never overwritten silently, never half-written, used by one process (or by parts of one run)."""
+"""A result folder: never overwritten silently, never half-written, used by one process (or by shards of one run)."""
 
-import errno
-import json
 import os
 import tomllib
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from secrets import token_hex
-from typing import IO, Any
-
-import numpy as np
+from typing import Any
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
-from pbcs_ompl.core.plain import plain
-from pbcs_ompl.results.lock import FolderLock
+from pbcs_ompl.results.files import (
+    CONFIG,
+    PROVENANCE,
+    RESULT,
+    read_json,
+    read_toml,
+    to_toml,
+    write_errors,
+    write_json,
+    write_toml,
+)
+from pbcs_ompl.results.lock import lock
 from pbcs_ompl.results.provenance import provenance
 
-CONFIG = "config.toml"
-RESULT = "result.json"
-PROVENANCE = "provenance.json"
+KINDS = ("plan", "train", "eval", "compare", "study")
+"""What a folder may hold: the `kind` of its config.toml, named after the verb that wrote it."""
 LOCK = ".lock"
 
 
@@ -29,25 +34,22 @@ class RunFolder:
     Args:
         path: The folder; it is created.
         resume: Continue in a folder that already holds a run instead of refusing it.
-        part: The name of the part of a run that this process makes; others may make other parts at the same time.
+        shard: The name of the shard that this process makes; others may make other shards at the same time.
 
     Raises:
         RunFolderError: the folder holds something, is in use, or cannot be written.
     """
 
-    def __init__(self, path: str | Path, *, resume: bool = False, part: str = ""):
+    def __init__(self, path: str | Path, *, resume: bool = False, shard: str = ""):
         self.path = Path(path)
         if resume and not (self.path / CONFIG).is_file():
             raise RunFolderError(f"nothing to resume: {self.path / CONFIG} does not exist")
-        leftovers = (LOCK, f".{CONFIG}.")  # of a process that was killed before it began
+        leftovers = (LOCK, f".{CONFIG}.")  # of a process that was killed before it wrote its settings
         if not resume and self.path.is_dir() and any(not p.name.startswith(leftovers) for p in self.path.iterdir()):
             raise RunFolderError(f"{self.path} already exists; choose another --out, or remove it first")
-        with clear_write_errors(self.path), ExitStack() as locks:
+        with write_errors(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
-            locks.enter_context(FolderLock(self.path / LOCK, shared=bool(part)))
-            if part:
-                locks.enter_context(FolderLock(self.path / f"{LOCK}-{part}"))
-            self._locks = locks.pop_all()
+            self._locks = _locked(self.path, shard)
         if resume:
             self._note_provenance()
 
@@ -62,41 +64,57 @@ class RunFolder:
         self._locks.close()
 
     def write_config(self, config: dict[str, Any]) -> None:
-        """Write the settings that repeat this run, and with which versions and on which machine it is made."""
-        write_text(self.path / CONFIG, to_toml(config))
+        """Write the settings that repeat this run, and with which versions and on which machine it is made.
+
+        Args:
+            config: Plain values, among them `kind`, one of `KINDS`.
+        """
+        write_toml(self.path / CONFIG, config)
         self._note_provenance()
 
     def _note_provenance(self) -> None:
-        """Add this process to those that worked here, unless one like it did."""
+        """Add this process to those that worked here, unless one with the same versions and machine did."""
         path = self.path / PROVENANCE
         before = read_json(path) if path.is_file() else []
         if provenance() not in before:
             write_json(path, [*before, provenance()])
 
     def write_result(self, result: dict[str, Any]) -> None:
-        """Write the answer as JSON."""
+        """Write what the run found, as JSON."""
         write_json(self.path / RESULT, result)
 
 
-def open_run(path: Path, config: dict[str, Any], *, may_change: tuple[str, ...] = (), part: str = "") -> RunFolder:
-    """Open a new folder for a run with these settings, or go on in the one where the same run was stopped.
+def _locked(path: Path, shard: str) -> ExitStack:
+    """Lock a folder, or one shard of it. The whole excludes all shards, and each shard the whole and itself."""
+    with ExitStack() as locks:
+        locks.enter_context(lock(path / (f"{LOCK}-shard-{shard}" if shard else LOCK)))
+        for other in [path / LOCK] if shard else path.glob(f"{LOCK}-shard-*"):
+            with lock(other):  # raises where it is held
+                pass
+        return locks.pop_all()
+
+
+def open_run(path: Path, config: dict[str, Any], *, may_change: tuple[str, ...] = (), shard: str = "") -> RunFolder:
+    """Open a new folder for a run with these settings, or resume in the one where the same run was stopped.
 
     Args:
+        path: The folder.
+        config: The settings; see `RunFolder.write_config`.
         may_change: Settings that may differ from those of the run that was stopped; the folder keeps the new ones.
-        part: The name of the part of the run that this process makes; see `RunFolder`.
+        shard: The name of the shard that this process makes; see `RunFolder`.
 
     Raises:
         RunFolderError: the folder holds something else or a run with other settings, is in use, or cannot be written.
     """
-    with clear_write_errors(path):
+    with write_errors(path):
         path.mkdir(parents=True, exist_ok=True)
-        with FolderLock(path / f"{LOCK}-opening", wait=True):  # parts that begin at the same time, one after the other
-            return _open_run(path, config, may_change, part)
+        with lock(path / f"{LOCK}-opening", wait=True):  # shards that start at the same time, one after the other
+            return _open_run(path, config, may_change, shard)
 
 
-def _open_run(path: Path, config: dict[str, Any], may_change: tuple[str, ...], part: str) -> RunFolder:
+def _open_run(path: Path, config: dict[str, Any], may_change: tuple[str, ...], shard: str) -> RunFolder:
     if not (path / CONFIG).is_file():
-        opened = RunFolder(path, part=part)
+        opened = RunFolder(path, shard=shard)
         opened.write_config(config)
         return opened
     before, now = read_toml(path / CONFIG), tomllib.loads(to_toml(config))
@@ -104,119 +122,87 @@ def _open_run(path: Path, config: dict[str, Any], may_change: tuple[str, ...], p
     forbidden = [key for key in different if key not in may_change]
     if forbidden:
         raise RunFolderError(f"{path} holds another run ({', '.join(forbidden)}); choose another --out")
-    opened = RunFolder(path, resume=True, part=part)
+    opened = RunFolder(path, resume=True, shard=shard)
     if different:
         opened.write_config(config)
     return opened
 
 
-@contextmanager
-def clear_write_errors(path: Path) -> Iterator[None]:
-    """Turn an OSError while writing below `path` into one clear line."""
-    try:
-        yield
-    except OSError as error:
-        if error.errno == errno.ENOSPC:
-            raise RunFolderError(f"the disk is full: could not write {path}; free some space and resume") from error
-        raise RunFolderError(f"cannot write {path}: {error.strerror or error}") from error
+@dataclass(frozen=True)
+class Folder:
+    """What a result folder holds.
+
+    Attributes:
+        path: Where it is.
+        kind: One of `KINDS`.
+        config: The settings that repeat it.
+        result: What it found; None when the run has not ended.
+        provenance: The versions and machines that worked here, one dictionary each.
+    """
+
+    path: Path
+    kind: str
+    config: dict[str, Any]
+    result: dict[str, Any] | None
+    provenance: list[dict[str, str]]
 
 
-def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write a file under a temporary name, flush it to disk, then rename it: it is whole or absent."""
-    with clear_write_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.name}.{token_hex(4)}")  # tempfile would hide it from all other users
-        try:
-            with open(temporary, "xb") as file:
-                write(file)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, path)
-        except BaseException:
-            temporary.unlink(missing_ok=True)
-            raise
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file atomically."""
-    write_atomically(path, lambda file: file.write(text.encode()))
-
-
-def write_json(path: Path, value: Any) -> None:
-    """Write JSON atomically; NumPy numbers and arrays become plain ones."""
-    write_text(path, json.dumps(value, indent=2, default=plain) + "\n")
-
-
-def write_arrays(path: Path, **arrays: np.ndarray) -> None:
-    """Write arrays as one compressed npz, atomically."""
-    write_atomically(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
-
-
-def read_json(path: Path) -> Any:
-    """Read JSON.
+def find_folders(root: Path) -> list[Path]:
+    """Return `root` if it is a result folder, else all result folders below it, sorted.
 
     Raises:
-        DamagedFile: the file is missing, truncated or not JSON.
+        RunFolderError: there is no such folder, or no result in it.
     """
-    try:
-        return json.loads(Path(path).read_text())
-    except FileNotFoundError as error:
-        raise DamagedFile(f"{path} does not exist") from error
-    except (OSError, ValueError) as error:
-        raise DamagedFile(f"{path} is damaged: {error}") from error
+    if not root.is_dir():
+        raise RunFolderError(f"{root} is not a folder")
+    found = sorted(_walk(root))
+    if not found:
+        raise RunFolderError(f"no results in {root}: neither it nor a folder below has a {CONFIG}")
+    return found
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read TOML.
+def _walk(root: Path) -> Iterator[Path]:
+    for place, folders, files in os.walk(root):
+        if CONFIG in files:
+            folders.clear()
+            yield Path(place)
+        folders[:] = [name for name in folders if not name.startswith(".")]
+
+
+def read_folder(path: Path) -> Folder:
+    """Read a result folder.
 
     Raises:
-        DamagedFile: the file is missing or does not parse.
+        DamagedFile: a file in it is damaged, or its settings are not those of a run.
     """
-    try:
-        return tomllib.loads(Path(path).read_text())
-    except FileNotFoundError as error:
-        raise DamagedFile(f"{path} does not exist") from error
-    except (OSError, ValueError) as error:
-        raise DamagedFile(f"{path} is damaged: {error}") from error
+    config = read_config(path)
+    result = read_json(path / RESULT) if (path / RESULT).is_file() else None
+    if not isinstance(result, dict | None):
+        raise DamagedFile(f"{path / RESULT} is not a result; expected a JSON object")
+    return Folder(path, config["kind"], config, result, _provenance(path, config))
 
 
-def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """Read all arrays of an npz, without pickle.
+def read_config(path: Path, kind: str | None = None) -> dict[str, Any]:
+    """Return the settings in a result folder.
+
+    Args:
+        path: The folder.
+        kind: What it has to hold; None for any of `KINDS`.
 
     Raises:
-        DamagedFile: the file is missing or truncated.
+        DamagedFile: they are damaged, or of another kind.
     """
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except FileNotFoundError as error:
-        raise DamagedFile(f"{path} does not exist") from error
-    except Exception as error:  # zipfile, zlib, ValueError, EOFError: all mean the same to the user
-        raise DamagedFile(f"{path} is damaged: {error}") from error
+    config = read_toml(path / CONFIG)
+    found, expected = config.get("kind"), KINDS if kind is None else (kind,)
+    if found not in expected:
+        raise DamagedFile(f"{path / CONFIG} has the kind {found!r}; expected {' or '.join(expected)}")
+    return config
 
 
-def to_toml(config: dict[str, Any]) -> str:
-    """Write a flat table, with sub-tables one level deep, as TOML. Values that are None are left out."""
-    flat = {key: value for key, value in config.items() if not isinstance(value, dict)}
-    tables = {key: value for key, value in config.items() if isinstance(value, dict)}
-    lines = [f"{key} = {_toml_value(value)}" for key, value in flat.items() if value is not None]
-    for name, table in tables.items():
-        lines += ["", f"[{name}]"]
-        lines += [f"{_toml_string(key)} = {_toml_value(value)}" for key, value in table.items() if value is not None]
-    return "\n".join(lines) + "\n"
-
-
-def _toml_value(value: Any) -> str:
-    value = plain(value) if isinstance(value, np.ndarray | np.generic | Path) else value
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_toml_string(k)} = {_toml_value(v)}" for k, v in value.items() if v is not None) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
-    if isinstance(value, float) and not np.isfinite(value):
-        return "nan" if np.isnan(value) else ("inf" if value > 0 else "-inf")
-    return _toml_string(value) if isinstance(value, str) else json.dumps(value)
-
-
-def _toml_string(text: str) -> str:
-    """Quote as JSON does, without the surrogate pairs and with the one control character that TOML wants escaped."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+def _provenance(path: Path, config: dict[str, Any]) -> list[dict[str, str]]:
+    if not (path / PROVENANCE).is_file():
+        return [config["versions"]] if "versions" in config else []
+    found = read_json(path / PROVENANCE)
+    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+        raise DamagedFile(f"{path / PROVENANCE} is damaged: expected a list of JSON objects")
+    return found

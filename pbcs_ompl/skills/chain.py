@@ -9,7 +9,7 @@ from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.results.folder import read_arrays, read_json, write_arrays, write_json
+from pbcs_ompl.results.files import read_arrays, read_json, write_arrays, write_json
 from pbcs_ompl.skills.episodes import with_random_actions
 from pbcs_ompl.skills.goals import ActivationSet, Goal
 from pbcs_ompl.skills.milestones import Milestones

@@ -7,7 +7,7 @@ import numpy as np
 
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.plain import plain
-from pbcs_ompl.results.folder import read_arrays, write_arrays
+from pbcs_ompl.results.files import read_arrays, write_arrays
 from pbcs_ompl.skills.method import Snapshot
 
 VERSION = 2

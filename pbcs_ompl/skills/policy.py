@@ -8,7 +8,7 @@ import numpy as np
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.errors import DamagedFile, MissingDependency
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.results.folder import write_atomically
+from pbcs_ompl.results.files import write_atomically
 
 HORIZON = 10
 """Relative observations are measured in the movement of this many steps, so that they are of order one nearby."""

@@ -15,10 +15,11 @@ from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
-from pbcs_ompl.results.folder import CONFIG, RESULT, RunFolder, read_toml
+from pbcs_ompl.results.files import CHECKPOINT, CONFIG, RESULT, read_toml
+from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.config import TrainConfig
 from pbcs_ompl.skills.result import TrainResult
-from pbcs_ompl.skills.training import CHECKPOINT, Training
+from pbcs_ompl.skills.training import Training
 
 
 def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, env_kwargs: dict[str, Any] | None = None,

@@ -16,7 +16,8 @@ from pbcs_ompl.core.errors import CallbackFailed, Mismatch, PbcsError
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Counter, ProgressCallback
-from pbcs_ompl.results.folder import RunFolder, read_json, write_json
+from pbcs_ompl.results.files import CHAIN, CHECKPOINT, PLAN, TRAJECTORY, read_json, write_json
+from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.results.provenance import planning_versions
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.checkpoint import read_checkpoint, write_checkpoint
@@ -27,11 +28,7 @@ from pbcs_ompl.skills.method import Method
 from pbcs_ompl.skills.milestones import Milestones
 from pbcs_ompl.skills.result import TrainResult
 
-TRAJECTORY = "trajectory.npz"
-PLAN = "plan.json"
-CHECKPOINT = "checkpoint.npz"
 MILESTONES = "milestones.npz"
-CHAIN = "chain"
 CHECKPOINT_SECONDS = 30.0
 ROBUST_EPSILON = 0.1
 ROBUST_RATE = 0.95

@@ -12,12 +12,11 @@ from pathlib import Path
 
 from pbcs_ompl.bridge.coverage import log_spaced
 from pbcs_ompl.experiments.compare import read_comparison
-from pbcs_ompl.experiments.compare.benchmark_log import write_logs
-from pbcs_ompl.experiments.compare.database import write_database
-from pbcs_ompl.experiments.compare.records import record_file
-from pbcs_ompl.experiments.compare.run import Job, broken
-from pbcs_ompl.experiments.compare.sweep import Sweep, make_sweep
-from pbcs_ompl.results.folder import CONFIG, to_toml, write_text
+from pbcs_ompl.experiments.planner_arena import write_database, write_logs
+from pbcs_ompl.experiments.planning_run import Job, broken
+from pbcs_ompl.experiments.records import record_file
+from pbcs_ompl.experiments.sweep import Sweep, make_sweep
+from pbcs_ompl.results.files import CONFIG, to_toml, write_text
 from pbcs_ompl.results.report import write_report
 
 PLANNERS, SIZES, SEEDS = ("Ex", "RRTNH", "EST", "KPIECE1"), range(2, 12), 250

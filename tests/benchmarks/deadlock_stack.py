@@ -15,8 +15,8 @@ import numpy as np
 
 from pbcs_ompl.agents import DDPG, DDPGSettings, EpsilonGreedy
 from pbcs_ompl.agents.update import one_thread
-from pbcs_ompl.experiments.study.observers import Probe
-from pbcs_ompl.experiments.study.stacked_training import LoopSettings, StackedTraining
+from pbcs_ompl.experiments.diagnostic_batch import Probe
+from pbcs_ompl.experiments.stacked_training import LoopSettings, StackedTraining
 from pbcs_ompl.resettable import make
 
 MODEL = make("pbcs/Toy1D-v0")

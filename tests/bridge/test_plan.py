@@ -30,7 +30,7 @@ from pbcs_ompl.core.errors import (
     UnknownName,
 )
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import read_toml
+from pbcs_ompl.results.files import read_toml
 
 MAZE = "pbcs/Maze-v0"
 SUMMARY = ["solved", "transitions", "collision_checks", "seconds", "nodes", "path_length", "replay_ok", "planner",

@@ -11,7 +11,7 @@ import pytest
 from gymnasium import spaces, wrappers
 
 from pbcs_ompl.cli import main
-from pbcs_ompl.results.folder import read_arrays, write_arrays
+from pbcs_ompl.results.files import read_arrays, write_arrays
 
 BOX = spaces.Box(-1.0, 1.0, (1,), np.float64)
 EVERYWHERE = spaces.Box(-np.inf, np.inf, (1,), np.float64)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pbcs_ompl.cli import main
-from pbcs_ompl.results.folder import read_toml
+from pbcs_ompl.results.files import read_toml
 
 
 def last_json(capsys: pytest.CaptureFixture[str]) -> dict:

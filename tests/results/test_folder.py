@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.results import folder as run_folder
-from pbcs_ompl.results.folder import (
-    RunFolder,
+from pbcs_ompl.results.files import (
     read_arrays,
     read_json,
     read_toml,
@@ -24,6 +23,7 @@ from pbcs_ompl.results.folder import (
     write_atomically,
     write_json,
 )
+from pbcs_ompl.results.folder import RunFolder
 
 names = st.text(st.characters(max_codepoint=0xFFFF, exclude_categories=["Cs"]), max_size=8)
 bare_names = st.text("abcdefghijklmnopqrstuvwxyz_", min_size=1, max_size=8)

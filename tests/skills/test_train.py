@@ -20,7 +20,7 @@ from pbcs_ompl.core.errors import (
     UnknownName,
 )
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import read_toml
+from pbcs_ompl.results.files import read_toml
 from pbcs_ompl.skills import SkillChain, resume, train
 from pbcs_ompl.skills.policy import policy_to_arrays
 

@@ -1,7 +1,6 @@
-"""Where runs are executed: in worker processes here, or on a Ray cluster. Every job makes exactly one record."""
+"""Where runs are executed: in worker processes here, or on a Ray cluster. Every run ends with a record or a failure."""
 
-from pbcs_ompl.experiments.workers.executors import Executor, check_resources, run_all
-from pbcs_ompl.experiments.workers.records import read_record
-from pbcs_ompl.experiments.workers.shard import Shard
+from pbcs_ompl.experiments.workers.executors import Executor, make_executor
+from pbcs_ompl.experiments.workers.worker import Limits
 
-__all__ = ["Executor", "Shard", "check_resources", "read_record", "run_all"]
+__all__ = ["Executor", "Limits", "make_executor"]

@@ -1,50 +1,75 @@
-"""The one call that executes runs, wherever that is."""
+"""What executes runs, and the one that uses processes of this machine."""
 
-from collections.abc import Callable, Generator, Sequence
-from typing import Any, Protocol, TypeVar
+from collections import deque
+from collections.abc import Generator, Sequence
+from functools import partial
+from multiprocessing.connection import wait
+from typing import Protocol
 
-from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.experiments.workers import local
-
-Job = TypeVar("Job")
-Record = TypeVar("Record")
+from pbcs_ompl.core.options import check_range
+from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
+from pbcs_ompl.experiments.workers.worker import Limits, Worker
 
 
 class Executor(Protocol):
-    """What executes runs elsewhere, such as `ray_cluster`."""
+    """What executes runs: processes of this machine, or a cluster as `ray_cluster` gives it."""
 
-    def __call__(self, jobs: Sequence[Any], run: Callable[[Any], Any], broken: Callable[[Any, str], Any], *,
-                 max_seconds: float | None, max_memory: float | None) -> Generator[Any, None, None]:
-        """Yield one record for each job, as `run_all` does."""
+    def __call__(self, runs: Sequence[Run], function: RunFunction,
+                 limits: Limits) -> Generator[tuple[Run, Record | Failure], None, None]:
+        """Yield each run once, when it ends, with what it found.
+
+        Close the generator (`contextlib.closing`) if you may leave it before its end: that ends the runs.
+
+        Args:
+            runs: The runs.
+            function: Makes one of them, in another process.
+            limits: What each of them may use.
+        """
+        ...
 
 
-def run_all(jobs: Sequence[Job], workers: int | Executor, run: Callable[[Job], Record],
-            broken: Callable[[Job, str], Record], *, max_seconds: float | None = None,
-            max_memory: float | None = None) -> Generator[Record, None, None]:
-    """Execute jobs and yield their records as they come, one for each job.
-
-    Close the generator (`contextlib.closing`) when you may leave it before its end: that ends the runs.
+def make_executor(jobs: int | Executor) -> Executor:
+    """Return what executes runs.
 
     Args:
-        workers: How many processes of this machine work at a time, or what executes the runs elsewhere.
-        run: Makes a record of a job; other processes must be able to import it.
-        broken: Makes a record of a job that did not come to an end, and of the reason.
-        max_seconds: Wall time of one run, without the start of its process; enforced from outside.
-        max_memory: Resident memory of the process of one run, in MB of 10^6 bytes; enforced from outside.
-    """
-    if isinstance(workers, int):
-        return local.run_all(jobs, workers, run, broken, max_seconds=max_seconds, max_memory=max_memory)
-    return workers(jobs, run, broken, max_seconds=max_seconds, max_memory=max_memory)
-
-
-def check_resources(workers: int | Executor, max_seconds: float | None = None, max_memory: float | None = None) -> None:
-    """Refuse fewer than one process, and limits that nothing can keep.
+        jobs: How many processes of this machine work at a time, or what executes the runs elsewhere.
 
     Raises:
-        InvalidOption: one of them is out of its range.
+        InvalidOption: fewer than one process.
     """
-    if isinstance(workers, int) and workers < 1:
-        raise InvalidOption(f"jobs is {workers}; expected at least 1")
-    for name, limit in (("max_seconds", max_seconds), ("max_memory", max_memory)):
-        if limit is not None and not limit > 0:
-            raise InvalidOption(f"{name} is {limit}; expected more than 0")
+    if not isinstance(jobs, int):
+        return jobs
+    check_range("jobs", jobs, jobs >= 1, "at least 1")
+    return partial(run_in_processes, jobs)
+
+
+def run_in_processes(jobs: int, runs: Sequence[Run], function: RunFunction,
+                     limits: Limits) -> Generator[tuple[Run, Record | Failure], None, None]:
+    """Execute runs in `jobs` processes; one that dies, hangs or exceeds a limit fails its own run only."""
+    waiting = deque(runs)
+    workers = [Worker(function, limits) for _ in range(min(jobs, len(waiting)))]
+    try:
+        for worker in workers:
+            worker.start(waiting.popleft())
+        while workers:
+            yield from _completed(workers, waiting)
+    finally:
+        for worker in workers:
+            worker.kill()
+
+
+def _completed(workers: list[Worker], waiting: deque[Run]) -> Generator[tuple[Run, Record | Failure], None, None]:
+    """Wait until something happens; yield the runs that ended, after their workers have started others."""
+    timeouts = [seconds for worker in workers if (seconds := worker.seconds_to_wait()) is not None]
+    wait([worker.connection for worker in workers], min(timeouts, default=None))
+    for worker in list(workers):
+        run, found = worker.run, worker.poll()
+        if found is None:
+            continue
+        continues = bool(waiting)
+        if continues:
+            worker.start(waiting.popleft())
+        yield run, found
+        if not continues:
+            workers.remove(worker)
+            worker.shutdown()

@@ -2,86 +2,85 @@
 
 import socket
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any
 
 from pbcs_ompl.core.errors import InvalidOption, Mismatch, MissingDependency
+from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
 from pbcs_ompl.experiments.workers.executors import Executor
-from pbcs_ompl.experiments.workers.serving import Ended
-from pbcs_ompl.experiments.workers.worker import Worker
+from pbcs_ompl.experiments.workers.worker import Limits, Worker
 from pbcs_ompl.results.provenance import PACKAGES, installed
 
-Job = TypeVar("Job")
-Record = TypeVar("Record")
 SECONDS_TO_CONNECT = 10.0
 RETRIES = 5
-"""How often a run is begun anew because its node was lost."""
-_workers: dict[tuple[Any, ...], Worker] = {}
+"""How often a run is started again because its node was lost."""
+_workers: dict[tuple[RunFunction, Limits], Worker] = {}
+"""The workers of this process, which Ray started on a node. Each lives as long as the process and makes many runs."""
 
 
 @contextmanager
-def ray_cluster(address: str = "auto", workers: int | None = None) -> Iterator[Executor]:
-    """Connect to a cluster, see that its nodes have our versions, and give what executes runs there.
+def ray_cluster(address: str = "auto", jobs: int | None = None) -> Iterator[Executor]:
+    """Connect to a cluster, check that its nodes have the same versions, and yield what executes runs there.
 
         with ray_cluster("head:6379") as cluster:
             compare(["Ex"], "pbcs/Maze-v0", jobs=cluster)
 
-    Every run takes one processor of a node. Nodes may come and go: what was lost with a node is made again.
+    Every run takes one processor of a node. Nodes may join and leave: a run whose node is lost is made again.
 
     Args:
         address: HOST:PORT of the cluster; "auto" for the one that this machine is a node of.
-        workers: How many runs at a time; None for as many as the cluster has processors.
+        jobs: How many runs at a time; None for as many as the cluster has processors.
 
     Raises:
         MissingDependency: Ray is not installed.
         InvalidOption: there is no cluster at this address.
-        Mismatch: nodes of the cluster have other versions of our libraries than this machine.
+        Mismatch: nodes of the cluster have other versions of the libraries than this machine.
     """
     ray = _ray()
     with _connection(ray, address):
         _check_versions(ray)
-        yield partial(_run_all, ray, workers)
+        yield partial(_run_on_cluster, ray, jobs)
 
 
-def _run_all(ray: ModuleType, workers: int | None, jobs: Sequence[Job], run: Callable[[Job], Record],
-             broken: Callable[[Job, str], Record], *, max_seconds: float | None,
-             max_memory: float | None) -> Generator[Record, None, None]:
+def _run_on_cluster(ray: ModuleType, jobs: int | None, runs: Sequence[Run], function: RunFunction,
+                    limits: Limits) -> Generator[tuple[Run, Record | Failure], None, None]:
     task = ray.remote(num_cpus=1, max_retries=RETRIES)(_make)
-    waiting = deque(jobs)
-    going: dict[Any, Job] = {}
+    waiting = deque(runs)
+    running: dict[Any, Run] = {}
     try:
-        while waiting or going:
-            while waiting and len(going) < (workers or _places(ray)):
-                job = waiting.popleft()
-                going[task.remote(run, max_seconds, max_memory, job)] = job
-            for reference in ray.wait(list(going))[0]:
-                ended, job = _ended(ray, reference), going.pop(reference)
-                yield ended.record if ended.reason is None else broken(job, ended.reason)
+        while waiting or running:
+            while waiting and len(running) < (jobs or _places(ray)):
+                run = waiting.popleft()
+                running[task.remote(function, limits, run)] = run
+            for reference in ray.wait(list(running))[0]:
+                found, run = _found(ray, reference), running.pop(reference)
+                yield run, found
     finally:
-        for reference in going:
+        for reference in running:
             ray.cancel(reference, force=True)
 
 
-def _make(run: Callable[[Any], Any], max_seconds: float | None, max_memory: float | None, job: Any) -> Ended:
-    """Make a run on a node, in a process below Ray's, which lives as long as that and makes its other runs too."""
-    key = (run, max_seconds, max_memory)
+def _make(function: RunFunction, limits: Limits, run: Run) -> Record | Failure:
+    """Make a run on a node, in a process below that of Ray."""
+    key = (function, limits)
     if key not in _workers:
-        _workers[key] = Worker(*key)
-    return _workers[key].make(job)
+        _workers[key] = Worker(function, limits)
+    return _workers[key].make(run)
 
 
-def _ended(ray: ModuleType, reference: Any) -> Ended:
+def _found(ray: ModuleType, reference: Any) -> Record | Failure:
     try:
-        return ray.get(reference)
+        found: Record | Failure = ray.get(reference)
     except ray.exceptions.RayError as error:
-        return Ended(reason=f"Ray gave it up: {type(error).__name__}: {error}")
+        return Failure(f"Ray gave it up: {type(error).__name__}: {error}")
+    return found
 
 
 def _places(ray: ModuleType) -> int:
-    """Return how many runs to hand over: twice as many as can go on, so that no processor waits for us."""
+    """Return how many runs to submit: twice as many as there are processors, so that none waits for this machine."""
     return max(1, 2 * int(ray.cluster_resources().get("CPU", 0)))
 
 
@@ -90,7 +89,8 @@ def _ray() -> ModuleType:
         import ray
     except ModuleNotFoundError as error:
         raise MissingDependency("the executor ray needs Ray: pip install 'pbcs-ompl[ray]'") from error
-    return ray
+    module: ModuleType = ray
+    return module
 
 
 @contextmanager
@@ -100,7 +100,7 @@ def _connection(ray: ModuleType, address: str) -> Iterator[None]:
         yield
         return
     try:
-        _knock(address)
+        _check_reachable(address)
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")
     except (OSError, ValueError) as error:
         raise InvalidOption(f"no Ray cluster at {address!r}: {error}; start one with: ray start --head") from error
@@ -112,8 +112,8 @@ def _connection(ray: ModuleType, address: str) -> Iterator[None]:
         ray.shutdown()
 
 
-def _knock(address: str) -> None:
-    """Raise OSError at once if nobody listens there; Ray itself would try for minutes."""
+def _check_reachable(address: str) -> None:
+    """Raise OSError at once if nothing listens there; Ray itself would try for minutes."""
     host, _, port = address.partition(":")
     if port.isdecimal():
         socket.create_connection((host, int(port)), timeout=SECONDS_TO_CONNECT).close()

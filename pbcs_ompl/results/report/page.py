@@ -3,15 +3,15 @@
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.core.formatting import in_words, short
-from pbcs_ompl.results.folder import write_atomically
-from pbcs_ompl.results.report.folder import find_folders
-from pbcs_ompl.results.report.section import Section, damaged_section, make_section
+from pbcs_ompl.results.files import write_atomically
+from pbcs_ompl.results.folder import find_folders
+from pbcs_ompl.results.report.section import DAMAGED, Section, damaged_section, make_section
 
 REPORT = "report.html"
 GENERATOR = '<meta name="generator" content="pbcs report">'
@@ -19,18 +19,35 @@ GENERATOR = '<meta name="generator" content="pbcs report">'
 HEAD_BYTES = 1024
 
 
-def write_report(folder: str | Path, out: str | Path | None = None) -> tuple[Path, list[Section]]:
+class Report(NamedTuple):
+    """A report that was written.
+
+    Attributes:
+        page: The file.
+        sections: What it shows of each folder.
+    """
+
+    page: Path
+    sections: list[Section]
+
+    def summary(self) -> dict[str, Any]:
+        """Return plain values: `out`, `folders` with their kinds and outcomes, the reasons of `damaged` ones."""
+        folders = [{"folder": section.name, "kind": section.kind, "outcome": section.content.outcome}
+                   for section in self.sections]
+        damaged = {section.name: reason for section in self.sections if section.kind == DAMAGED
+                   for _, reason in section.content.failures}
+        return {"out": str(self.page), "folders": folders, "damaged": damaged}
+
+
+def write_report(folder: str | Path, out: str | Path | None = None) -> Report:
     """Write what a result folder holds, or all result folders below one, as one HTML page.
 
     Args:
         folder: A result folder, or one that holds many.
         out: The page; report.html in `folder` by default. A report that is there already is replaced.
 
-    Returns:
-        The page's path, and what it shows of each folder.
-
     Raises:
-        RunFolderError: no results in `folder`; or `out` is a file of somebody else, or cannot be written.
+        RunFolderError: no results in `folder`; or `out` is not a report, or cannot be written.
         DamagedFile: `folder` is a result folder with a damaged file. One among many is reported on the page.
     """
     root = Path(folder)
@@ -42,7 +59,7 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> tuple[Pat
         sections=sections, single=paths == [root], root=str(root), generator=GENERATOR, version=version("pbcs-ompl"),
         now=datetime.now().astimezone().isoformat(sep=" ", timespec="minutes"))
     write_atomically(page, lambda file: file.writelines(part.encode() for part in stream))
-    return page, sections
+    return Report(page, sections)
 
 
 def _section(path: Path, root: Path) -> Section:

@@ -1,23 +1,16 @@
 """One result folder as a section of a report."""
 
 import base64
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from struct import Struct
 
 from pbcs_ompl.core.errors import DamagedFile
-from pbcs_ompl.results.folder import CONFIG
-from pbcs_ompl.results.report.comparison import comparison_content
-from pbcs_ompl.results.report.content import Content, Table
-from pbcs_ompl.results.report.folder import Folder, read_folder
-from pbcs_ompl.results.report.repeat import going_on, repeating
-from pbcs_ompl.results.report.single import evaluation_content, plan_content, training_content
-from pbcs_ompl.results.report.study import study_content
+from pbcs_ompl.results.files import CONFIG, FIGURES
+from pbcs_ompl.results.folder import read_folder
+from pbcs_ompl.results.report.contents import Content, Table, read_content
+from pbcs_ompl.results.report.repeat import repeating, resuming
 
-CONTENTS: dict[str, Callable[[Folder], Content]] = {
-    "plan": plan_content, "train": training_content, "eval": evaluation_content,
-    "compare": comparison_content, "study": study_content}
 PNG = b"\x89PNG\r\n\x1a\n"
 HEAD = Struct(">8s8xII")
 """The first bytes of a PNG: its signature, the length and name of its first chunk, the width and the height."""
@@ -57,12 +50,12 @@ class Section:
 
     Attributes:
         name: The folder, as seen from that of the report.
-        kind: What it holds, `DAMAGED` where nobody can tell.
-        content: What came out.
+        kind: What it holds; `DAMAGED` if it cannot be read.
+        content: What it found.
         figures: Its pictures.
         settings: Its config.toml.
-        versions: What worked there.
-        repeat, go_on: Commands; "" where there is none.
+        versions: The versions and machines that made it.
+        repeat, resume: Commands; "" where there is none.
     """
 
     name: str
@@ -72,7 +65,7 @@ class Section:
     settings: str
     versions: Table
     repeat: str
-    go_on: str
+    resume: str
 
 
 def make_section(path: Path, root: Path) -> Section:
@@ -83,13 +76,13 @@ def make_section(path: Path, root: Path) -> Section:
     """
     folder = read_folder(path)
     try:
-        content, repeat, go_on = CONTENTS[folder.kind](folder), repeating(folder), going_on(folder)
+        content, repeat, resume = read_content(folder), repeating(folder), resuming(folder)
     except (KeyError, TypeError) as error:
         raise DamagedFile(f"{path} is not the folder of a {folder.kind} as this version writes it: "
                           f"{error!r}") from error
-    pictures = [*path.glob("*.png"), *path.glob("figures/*.png")]
+    pictures = [*path.glob("*.png"), *path.glob(f"{FIGURES}/*.png")]
     return Section(_name(path, root), folder.kind, content, [read_figure(picture) for picture in sorted(pictures)],
-                   (path / CONFIG).read_text(), _versions(folder.provenance), repeat, go_on)
+                   (path / CONFIG).read_text(), _versions(folder.provenance), repeat, resume)
 
 
 def damaged_section(path: Path, root: Path, error: DamagedFile) -> Section:
@@ -104,7 +97,7 @@ def _name(path: Path, root: Path) -> str:
 
 def _versions(provenance: list[dict[str, str]]) -> Table:
     """Return one column for each process that worked in a folder."""
-    columns = ["", *(f"went on {number}" if number else "begun" for number in range(len(provenance)))]
+    columns = ["", *(f"resumed {number}" if number else "started" for number in range(len(provenance)))]
     keys = list(dict.fromkeys(key for one in provenance for key in one))
     rows = [[key, *(one.get(key) for one in provenance)] for key in keys]
     return Table("Versions and machine", columns if len(provenance) > 1 else [], rows, folded=True)

@@ -1,4 +1,4 @@
-"""Planners that go wrong, found as `misbehaving:NAME` by the processes of a comparison."""
+"""Planners that fail, found as `misbehaving:NAME` by the processes of a comparison."""
 
 import os
 import re
@@ -29,7 +29,7 @@ class Deadly(ob.Planner):
 
 
 class Hanging(ob.Planner):
-    """Never comes back, and never lets another thread of Python work, as a loop in C++ does."""
+    """Never returns, and never lets another thread of Python work, as a loop in C++ does."""
 
     def __init__(self, si):
         super().__init__(si, "Hanging")
@@ -51,14 +51,14 @@ class Hungry(ob.Planner):
 
 
 class Waiting(ob.Planner):
-    """Says where it is, and waits for the end of its budget."""
+    """Writes the number of its process into a file, and waits for the end of its budget."""
 
-    def __init__(self, si, told=""):
+    def __init__(self, si, file=""):
         super().__init__(si, "Waiting")
-        self.told = told
+        self.file = file
 
     def solve(self, ptc):
-        Path(self.told).write_text(str(os.getpid()))
+        Path(self.file).write_text(str(os.getpid()))
         while not ptc():
             pass
         return ob.PlannerStatus(ob.PlannerStatus.TIMEOUT)

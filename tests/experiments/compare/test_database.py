@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 from ompl.tools import readBenchmarkLog
 
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import RunFolderError
-from pbcs_ompl.experiments.compare.benchmark_log import write_logs
-from pbcs_ompl.experiments.compare.database import write_database
-from pbcs_ompl.experiments.compare.run import broken
-from pbcs_ompl.experiments.compare.sweep import make_sweep
+from pbcs_ompl.experiments.planner_arena import write_database, write_logs
+from pbcs_ompl.experiments.planning_run import failed_record
+from pbcs_ompl.experiments.run import Failure
+from pbcs_ompl.experiments.sweep import make_sweep
 
 EXPERIMENTS = ["id", "name", "totaltime", "timelimit", "memorylimit", "runcount", "version", "hostname",
                "cpuinfo", "date", "seed", "setup"]
@@ -20,21 +21,23 @@ OURS = ["transitions", "collision_checks", "path_length", "replay_ok", "coverage
 
 @pytest.fixture
 def sweep():
-    return make_sweep({"Ex": {"bin_size": [0.1, 0.2]}, "RRT": {}}, "pbcs/Maze-v0", [{"size": 2}, {"size": 3}], [4, 5],
-                      100, None, 500.0)
+    return make_sweep({"Ex": {"bin_size": [0.1, 0.2]}, "RRT": {}},
+                      [EnvSpec("pbcs/Maze-v0", {"size": size}) for size in (2, 3)], [4, 5], 100, None, 500.0)
 
 
 @pytest.fixture
 def records(sweep):
     """Every run is solved but those of RRT: one fails, one is not solved."""
     made = []
-    for number, job in enumerate(sweep.jobs(), start=1):
-        record = {**broken(job, ""), "solved": True, "transitions": 50 + number, "collision_checks": 60 + number,
-                  "seconds": 0.5 * number, "nodes": 20, "path_length": 7, "replay_ok": True, "memory": 100.5,
+    for number, run in enumerate(sweep.runs(), start=1):
+        record = {**failed_record(run, Failure("")), "solved": True, "transitions": 50 + number,
+                  "collision_checks": 60 + number, "seconds": 0.5 * number, "nodes": 20, "path_length": 7,
+                  "replay_ok": True, "memory": 100.5,
                   "coverage": 0.25, "progress": {"transitions": [1, 50], "seconds": [1e-7, 0.5 * number],
                                                  "coverage": [0.125, 0.25]}, "reason": None}
         unsolved = {**record, "solved": False, "path_length": None, "replay_ok": None}
-        made.append(record if job.planner == "Ex" else broken(job, "died") if job.seed == 4 else unsolved)
+        died = failed_record(run, Failure("died"))
+        made.append(record if run.settings["planner"] == "Ex" else died if run.settings["seed"] == 4 else unsolved)
     return made
 
 
@@ -61,14 +64,14 @@ def test_columns_planner_arena_relies_on(database):
     assert columns(database, "progress") == ["runid", "time", "transitions", "coverage"]
 
 
-def test_every_number_of_every_record_arrives(database, records):
+def test_every_number_of_every_record_is_in_the_database(database, records):
     names = ["time", "memory", "solved", *OURS, "correct_solution", "solution_length", "graph_states"]
     found = database.execute("SELECT x.name, p.name, e.description, " + ", ".join(f"r.{name}" for name in names) +
                              " FROM runs r JOIN plannerConfigs p ON p.id = r.plannerid "
                              "JOIN experiments x ON x.id = r.experimentid "
                              "JOIN enums e ON e.name = 'status' AND e.value = r.status").fetchall()
     fields = ["seconds", "memory", "solved", *OURS, "replay_ok", "path_length", "nodes"]
-    expected = [(f"pbcs/Maze-v0(size={record['env_kwargs']['size']})", record["planner"],
+    expected = [(f"pbcs/Maze-v0(size={record['environment']['kwargs']['size']})", record["planner"],
                  "Exact solution" if record["solved"] else "Crash" if record["seconds"] is None else "Timeout",
                  *(record[name] for name in fields)) for record in records]
     assert sorted(found, key=str) == sorted(expected, key=str)
@@ -88,7 +91,8 @@ def test_what_an_experiment_says(database, sweep):
     assert [row[:6] for row in found] == [(f"OMPL {sweep.versions['ompl']}", 2, None, 500.0, 100, "4")] * 2
     assert json.loads(found[0][6]) == sweep.config()
     assert database.execute("SELECT name, settings FROM plannerConfigs").fetchall() == \
-        [("Ex", "bin_size = [0.1, 0.2]\n;"), ("RRT", "")]
+        [("Ex", 'bin_size = [0.1, 0.2]\n;batch = "grow"\n;control_duration = 1\n;'),
+         ("RRT", "goal_bias = 0.0\n;intermediate_states = false\n;control_duration = 1\n;")]
     assert len(database.execute("SELECT * FROM bestPlannerConfigsPerExperiment").fetchall()) == 4
 
 

@@ -12,8 +12,8 @@ import pytest
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
-from pbcs_ompl.experiments.study import find_study, run_study
-from pbcs_ompl.experiments.study.execute import open_study
+from pbcs_ompl.experiments.run_study import open_study, run_study
+from pbcs_ompl.experiments.study import find_study
 
 RUNS, KILLS = 120, 8
 SCRIPT = f'''
@@ -31,7 +31,7 @@ def run(settings):
     return {{"seed": settings["seed"], "walk": [draw.random() for _ in range(20_000)]}}
 '''
 ANALYSIS = '''
-from pbcs_ompl.experiments.study import Claim
+from pbcs_ompl.experiments.claims import Claim
 
 def analyse(records, figures):
     return [Claim("all came back", [one["seed"] for one in records] == list(range(len(records))))]
@@ -89,7 +89,7 @@ def test_a_second_process_is_kept_out_of_the_folder(folder, tmp_path, capsys):
             run_study(study, out=tmp_path / "out")
         assert main(["study", str(folder), "--out", str(tmp_path / "out")]) == 2
         assert main(["study", str(folder), "--out", str(tmp_path / "out"), "--shard", "1/2"]) == 2
-    assert capsys.readouterr().err.count("is in use by another process; wait for its end") == 2
+    assert capsys.readouterr().err.count("is in use by another process; wait until it ends") == 2
 
 
 @pytest.mark.parametrize("damage", ['{"seed": 0, "wa', "", "[1]", "null"])

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.experiments.study.random_walk import densities, found_by, simulate
+from pbcs_ompl.experiments.studies.toy_analysis.random_walk import densities, found_by, simulate
 
 
 @settings(max_examples=20, deadline=None)

@@ -6,7 +6,7 @@ import pytest
 from pbcs_ompl.agents import DDPG, DDPGSettings
 from pbcs_ompl.agents.noise import make_noise
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.experiments.study.stacked_training import NEVER, LoopSettings, StackedTraining, solved
+from pbcs_ompl.experiments.stacked_training import NEVER, LoopSettings, StackedTraining, solved
 from pbcs_ompl.resettable import make
 
 TOY = make("pbcs/Toy1D-v0")
@@ -42,7 +42,7 @@ def test_an_expert_finds_the_reward_with_every_step_and_its_episodes_end_there()
     assert (run._states == 0.0).all()
 
 
-def test_the_expert_comes_when_it_is_told_to():
+def test_the_expert_acts_from_its_step_on():
     curves = training((0,), "ornstein-uhlenbeck", model=make("pbcs/Drift-v0"), expert=lambda states: states * 0.0 - 1.0,
                       expert_after=100).run()
     np.testing.assert_array_equal(curves.first_reward, [NEVER])
@@ -55,11 +55,11 @@ def test_a_seed_does_the_same_in_a_stack_that_others_leave(noise):
     together, leaving = (training(tuple(range(10)), noise, steps=1000, patience=patience, copies=2,
                                   observers=observers) for patience in (0, 2))
     full, curves = together.run(), leaving.run()
-    assert (full.left == NEVER).all()
-    assert len(set(curves.left.tolist())) > 2, "the case needs seeds that leave one after the other"
-    np.testing.assert_array_equal(leaving.active, np.flatnonzero(curves.left == NEVER))
+    assert (full.solved_at == NEVER).all()
+    assert len(set(curves.solved_at.tolist())) > 2, "the case needs seeds that leave one after the other"
+    np.testing.assert_array_equal(leaving.active, np.flatnonzero(curves.solved_at == NEVER))
     np.testing.assert_array_equal(curves.first_reward, full.first_reward)
-    for index, left in enumerate(curves.left):
+    for index, left in enumerate(curves.solved_at):
         rows = [row for row, step in enumerate(full.steps) if left == NEVER or step <= left]
         for name in ("success", "rewarded"):
             np.testing.assert_array_equal(np.array(getattr(curves, name))[rows, index],
@@ -75,7 +75,7 @@ def test_a_solved_stack_ends_early():
     curves = always.run()
     assert curves.ended < 5000
     assert np.array(curves.success)[-2:].all()
-    assert curves.left.max() == curves.ended
+    assert curves.solved_at.max() == curves.ended
 
 
 def test_solved_is_what_the_policy_does():

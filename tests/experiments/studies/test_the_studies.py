@@ -1,15 +1,18 @@
-"""Every study of the project runs from end to end on a sweep that was made small, and says what it found."""
+"""Every study of the package runs from end to end on a small sweep, and any part of its records can be analysed."""
 
 import json
-import tomllib
+from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
 
+from pbcs_ompl.experiments.claims import greater
+from pbcs_ompl.experiments.studies.exploration_trees import study as trees
+from pbcs_ompl.experiments.studies.toy_analysis import study as toy
+from pbcs_ompl.experiments.studies.toy_analysis.random_walk import found_by
 from pbcs_ompl.experiments.study import find_study, study_ids
-from pbcs_ompl.experiments.study.random_walk import found_by
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import to_toml
 
 LOOP = {"steps": 100, "evaluate_every": 50, "patience": 1}
 SMALL = {
@@ -56,35 +59,48 @@ SLOW = ("backplay-2x2", "deadlock", "exploration-trees", "half-cheetah-priming",
 SIMULATED = ("antmaze-exploration", "half-cheetah-priming")
 
 
+def analysis_of(name):
+    """Return the module of the analysis of a study."""
+    return import_module(f"pbcs_ompl.experiments.studies.{name.replace('-', '_')}.analysis")
+
+
 def test_every_study_is_tested():
-    assert set(study_ids()) >= set(SMALL)
+    assert set(study_ids()) == set(SMALL)
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in SMALL])
-def test_it_runs_and_its_claims_are_sentences_with_numbers(name, tmp_path):
+def test_it_runs_and_its_claims_are_sentences_with_numbers(name, tmp_path, monkeypatch):
     if name in SIMULATED:
         pytest.importorskip("mujoco")
     original = find_study(name)
-    folder = tmp_path / name
-    folder.mkdir()
-    for part in (*original.folder.glob("*.py"), *original.folder.glob("*.npz")):
-        (folder / part.name).write_bytes(part.read_bytes())
-    sweep = tomllib.loads((original.folder / "sweep.toml").read_text()) | SMALL[name]
-    (folder / "sweep.toml").write_text(to_toml(sweep))
-    study, figures = find_study(str(folder)), tmp_path / "figures"
-    figures.mkdir()
-    records = [json.loads(json.dumps(study.run(settings))) for settings in study.runs(study.sweep, 1)]
-    claims = study.analyse(records, figures)
-    assert list(figures.glob("*.png"))
+    study = replace(original, sweep=original.sweep | SMALL[name])
+    records = [json.loads(json.dumps(original.run(run.settings))) for run in study.all_runs(1)]
+    claims = study.analyse(records, tmp_path)
+    assert list(tmp_path.glob("*.png"))
     assert len(claims) >= 3
     for claim in claims:
         assert claim.agrees in (True, False, None)
         assert claim.numbers
         assert claim.source
+    monkeypatch.setattr(analysis_of(name), "save", lambda figure, path: None)
+    for part in range(1, len(records)):
+        assert all(claim.agrees in (True, False, None) for claim in study.analyse(records[:part], tmp_path))
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_without_records_no_claim_is_decided(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(analysis_of(name), "save", lambda figure, path: None)
+    assert {claim.agrees for claim in find_study(name).analyse([], tmp_path)} <= {None}
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_every_run_has_a_name_and_plain_settings(name):
+    runs = find_study(name).all_runs()
+    assert len({run.name for run in runs}) == len(runs) > 0
 
 
 def test_evenness_is_the_share_of_what_a_tree_fills_evenly():
-    evenness = find_study("exploration-trees").runs.__globals__["evenness"]
+    evenness = trees.evenness
     whole = np.ones(16)
     assert evenness(np.full(16, 3.0), whole) == pytest.approx(1.0)
     assert evenness(np.eye(16)[0], whole) == pytest.approx(1 / 16)
@@ -94,22 +110,33 @@ def test_evenness_is_the_share_of_what_a_tree_fills_evenly():
 
 
 def test_cells_know_how_much_of_them_can_be_reached():
-    scope = find_study("exploration-trees").runs.__globals__
     disc = make("pbcs/Disc-v0")
     states = np.random.default_rng(0).uniform(0.0, 5.0, (100_000, 2))
     states = states[disc.is_valid(states)]
-    counts, areas = scope["cells"](disc, states, 0.25)
+    counts, areas = trees.cells(disc, states, 0.25)
     assert counts.sum() == len(states)
     assert areas.sum() * 0.25**2 == pytest.approx(np.pi * 1.25**2, rel=0.01)
-    assert scope["evenness"](counts, areas) == pytest.approx(1.0, abs=0.01)
-    left, _ = scope["cells"](disc, states[states[:, 0] < 1.75], 0.25)
-    assert scope["evenness"](left, areas) == pytest.approx(0.5, abs=0.01)
-    assert scope["coverage"](left, areas) == pytest.approx(0.5)
-    assert scope["density"](states, (1.75, 1.75, 1.0)) == pytest.approx(100_000 / 25, rel=0.05)
+    assert trees.evenness(counts, areas) == pytest.approx(1.0, abs=0.01)
+    left, _ = trees.cells(disc, states[states[:, 0] < 1.75], 0.25)
+    assert trees.evenness(left, areas) == pytest.approx(0.5, abs=0.01)
+    assert trees.coverage(left, areas) == pytest.approx(0.5)
+    assert trees.density(states, (1.75, 1.75, 1.0)) == pytest.approx(100_000 / 25, rel=0.05)
 
 
 def test_theorem_5_as_printed_by_hand():
     """Without pauses it is the walk. With p = 1/2: P_1 = 1/2 below 0, P_2 = 1/4, so (1/2 1/4) / (1 - 1/2 1/2) = 1/6."""
-    theorem_5 = find_study("toy-analysis").runs.__globals__["_theorem_5"]
-    np.testing.assert_allclose(theorem_5(10, 1.0), found_by(10))
-    np.testing.assert_allclose(theorem_5(2, 0.5), [1 / 2, 1 / 2 + 1 / 2 * 1 / 6])
+    np.testing.assert_allclose(toy.theorem_5(10, 1.0), found_by(10))
+    np.testing.assert_allclose(toy.theorem_5(2, 0.5), [1 / 2, 1 / 2 + 1 / 2 * 1 / 6])
+
+
+@pytest.mark.parametrize(("first", "second", "agrees"), [
+    ({seed: 2.0 + seed for seed in range(5)}, {seed: 1.0 for seed in range(5)}, True),
+    ({seed: 1.0 for seed in range(5)}, {seed: 2.0 + seed for seed in range(5)}, False),
+    ({seed: 1.0 for seed in range(5)}, {seed: 1.0 for seed in range(5)}, False),
+    ({seed: 2.0 for seed in range(4)}, {seed: 1.0 for seed in range(9)}, None),
+    ({}, {}, None)])
+def test_greater_pairs_what_both_have(first, second, agrees):
+    claim = greater("one is greater", first, second, ("one", "other"), "here")
+    assert claim.agrees is agrees
+    assert claim.numbers["greater"]["n"] == len(first)
+    assert bool(claim.note) == (agrees is None)

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.experiments.study import find_study, run_shard, run_study
-from pbcs_ompl.experiments.workers import Shard
+from pbcs_ompl.experiments.run import Shard
+from pbcs_ompl.experiments.run_study import run_shard, run_study
+from pbcs_ompl.experiments.study import find_study
 from pbcs_ompl.experiments.workers.schedulers import LARGEST_ARRAY, slurm_script
 
 SCRIPT = '''
@@ -29,7 +30,7 @@ def run(settings):
     return {"square": settings["seed"] ** 2}
 '''
 ANALYSIS = '''
-from pbcs_ompl.experiments.study import Claim
+from pbcs_ompl.experiments.claims import Claim
 
 def analyse(records, figures):
     return [Claim("they are squares", [one["square"] for one in records] == [n * n for n in range(len(records))])]
@@ -133,7 +134,7 @@ def test_limits_of_a_run_come_from_outside(folder, study):
     (folder / "study.py").write_text(SCRIPT.replace("    with open", "    __import__('time').sleep(9)\n    with open"))
     status, said = study("--seeds 1 --max-seconds 0.5")
     assert status == 2
-    assert "stopped from outside after 0.5 s" in said
+    assert "killed after 0.5 s" in said
 
 
 def test_the_makefile_makes_each_run_once_and_then_the_analysis(folder, study, tmp_path):

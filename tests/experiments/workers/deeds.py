@@ -1,4 +1,4 @@
-"""Runs that behave and misbehave, found as `deeds:NAME` by worker processes. A job is (name, anything)."""
+"""Runs that behave and misbehave, found as `deeds:NAME` by worker processes."""
 
 import ctypes
 import os
@@ -8,14 +8,18 @@ import sys
 import time
 from pathlib import Path
 
-
-def do(job):
-    name, value = job
-    return {"name": name, "value": DEEDS[name](value), "pid": os.getpid()}
+from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.experiments.run import Run
 
 
-def broken(job, reason):
-    return {"name": job[0], "value": job[1], "reason": reason}
+def deed(name, value):
+    """Return a run."""
+    return Run(f"{name}-{value}", {"deed": name, "value": value})
+
+
+def do(run):
+    return {"deed": run.settings["deed"], "value": DEEDS[run.settings["deed"]](run.settings["value"]),
+            "pid": os.getpid()}
 
 
 def note(path):
@@ -49,6 +53,10 @@ def refuse(_):
     raise ValueError("this deed\nis refused")
 
 
+def misuse(_):
+    raise PbcsError("this deed does not exist")
+
+
 time.sleep(float(os.environ.get("SECONDS_TO_IMPORT", "0")))
 KEPT: list[bytearray] = []
 DEEDS = {
@@ -59,6 +67,7 @@ DEEDS = {
     "keep": keep,
     "wait with a child": wait_with_a_child,
     "refuse": refuse,
+    "misuse": misuse,
     "exit": sys.exit,
     "segfault": lambda _: ctypes.string_at(0),
     "kill": lambda _: os.kill(os.getpid(), signal.SIGKILL),

@@ -7,12 +7,13 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from deeds import broken, do
+from deeds import deed, do
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import InvalidOption, Mismatch, MissingDependency
 from pbcs_ompl.experiments.compare import compare
-from pbcs_ompl.experiments.workers import run_all
+from pbcs_ompl.experiments.run import Failure
+from pbcs_ompl.experiments.workers import Limits
 from pbcs_ompl.experiments.workers.ray import ray_cluster
 
 NODE = {"num_cpus": 1, "object_store_memory": 100_000_000}
@@ -30,38 +31,38 @@ def cluster(monkeypatch):
     cluster.shutdown()
 
 
-def run(cluster, jobs, **options):
-    with ray_cluster(cluster.address, options.pop("workers", None)) as executor:
-        yield from run_all(jobs, executor, do, broken, **options)
+def execute(cluster, runs, jobs=None, **limits):
+    with ray_cluster(cluster.address, jobs) as executor:
+        yield from executor(runs, do, Limits(**limits))
 
 
 @pytest.mark.slow
 def test_a_lost_node_costs_no_run(cluster):
     node = cluster.add_node(**NODE)
-    jobs = [("sleep", 0.5 + number / 1000) for number in range(12)]
+    runs = [deed("sleep", 0.5 + number / 1000) for number in range(12)]
     records, pids = [], set()
-    with closing(run(cluster, jobs)) as made:
-        for record in made:
+    with closing(execute(cluster, runs)) as ended:
+        for _, record in ended:
             records.append(record)
             pids.add(record["pid"])
             if len(records) == 4:
                 cluster.remove_node(node, allow_graceful=False)
     assert len(pids) >= 2  # both nodes had a part
-    assert not any("reason" in record for record in records)
-    assert sorted(record["value"] for record in records) == [value for _, value in jobs]
+    assert not any(isinstance(record, Failure) for record in records)
+    assert sorted(record["value"] for record in records) == [run.settings["value"] for run in runs]
 
 
 @pytest.mark.slow
 def test_runs_that_go_wrong_cost_only_themselves_and_limits_hold(cluster):
-    jobs = [("square", 3), ("kill", 1), ("refuse", 2), ("sleep", 60), ("eat", 400), ("square", 4)]
-    records = {(record["name"], record["value"]): record.get("reason", "")
-               for record in run(cluster, jobs, max_seconds=6.0, max_memory=300.0, workers=1)}
-    assert len(records) == len(jobs)
-    assert records["square", 9] == records["square", 16] == ""
-    assert records["kill", 1].startswith("the process died, Killed")
-    assert records["refuse", 2].startswith("ValueError")
-    assert records["sleep", 60].startswith("stopped from outside after 6 s")
-    assert "MB of memory" in records["eat", 400]
+    runs = [deed("square", 3), deed("kill", 1), deed("refuse", 2), deed("sleep", 60), deed("eat", 400),
+            deed("square", 4)]
+    found = {run.name: found for run, found in execute(cluster, runs, 1, max_seconds=6.0, max_memory=300.0)}
+    assert len(found) == len(runs)
+    assert (found["square-3"]["value"], found["square-4"]["value"]) == (9, 16)
+    assert found["kill-1"].reason.startswith("the process died, Killed")
+    assert found["refuse-2"].reason.startswith("ValueError")
+    assert found["sleep-60"].reason.startswith("killed after 6 s")
+    assert "MB of memory" in found["eat-400"].reason
 
 
 @pytest.mark.slow
@@ -71,7 +72,7 @@ def test_a_node_with_other_versions_is_named_before_any_run(cluster, tmp_path):
     (other / "METADATA").write_text("Metadata-Version: 2.1\nName: numpy\nVersion: 9.9.9\n")
     cluster.add_node(**NODE, env_vars={"PYTHONPATH": str(tmp_path)})
     with pytest.raises(Mismatch, match=r"^node \w+ has numpy 9\.9\.9 \(here 2[.\d]+\); install the same"):
-        list(run(cluster, [("note", tmp_path / "noted")]))
+        list(execute(cluster, [deed("note", str(tmp_path / "noted"))]))
     assert not (tmp_path / "noted").exists()
 
 

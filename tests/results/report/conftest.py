@@ -18,7 +18,7 @@ def run(settings):
 ''',
     "analysis.py": '''
 from pbcs_ompl.figures.canvas import new_figure, save
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 
 def analyse(records, figures):
     figure, axes = new_figure()

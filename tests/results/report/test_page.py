@@ -5,14 +5,14 @@ import shutil
 from html.parser import HTMLParser
 
 import pytest
+from pbcs_ompl.results.report.content import MOST_RUNS
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.core.formatting import in_words, seeds_in_words
-from pbcs_ompl.experiments.study import rate
-from pbcs_ompl.results.folder import write_json, write_text
+from pbcs_ompl.experiments.claims import rate
+from pbcs_ompl.results.files import write_json, write_text
 from pbcs_ompl.results.report import write_report
-from pbcs_ompl.results.report.content import MOST_RUNS
 
 REFERENCES = {"src", "href", "srcset", "data", "action", "poster", "background"}
 

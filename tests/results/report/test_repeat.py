@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from pbcs_ompl.cli import compare, eval, main, plan, study, train
 from pbcs_ompl.cli.arguments import build_parser, parse
-from pbcs_ompl.experiments.compare.sweep import make_sweep
-from pbcs_ompl.results.command_words import environment_words
-from pbcs_ompl.results.folder import read_toml, to_toml
-from pbcs_ompl.results.report.folder import Folder, read_folder
+from pbcs_ompl.experiments.sweep import make_sweep
+from pbcs_ompl.results.command_line import environment_words
+from pbcs_ompl.results.files import read_toml, to_toml
+from pbcs_ompl.results.folder import Folder, read_folder
 from pbcs_ompl.results.report.repeat import going_on, repeating
 from pbcs_ompl.skills.config import TrainConfig
 

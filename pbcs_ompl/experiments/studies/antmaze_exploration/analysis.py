@@ -7,9 +7,8 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from scipy.stats import mannwhitneyu
 
-from pbcs_ompl.experiments.compare.statistics import censored
-from pbcs_ompl.experiments.study import Claim, rate
-from pbcs_ompl.experiments.study.paired import FEWEST, SURE
+from pbcs_ompl.experiments.claims import FEWEST_PAIRS, SIGNIFICANCE, Claim, rate
+from pbcs_ompl.experiments.planner_statistics import censored
 from pbcs_ompl.figures.canvas import save
 from pbcs_ompl.figures.compare import distribution_figure
 from pbcs_ompl.figures.maze import stage
@@ -23,6 +22,8 @@ FIGURE = "[Matheron2020] Fig. 3.9"
 
 def analyse(records: Records, figures: Path) -> list[Claim]:
     """Draw the distributions and one exploration of each planner; compare Ex with the others."""
+    if not records:
+        return []
     budget = records[0]["max_transitions"]
     planners: dict[str, Records] = {}
     for record in records:
@@ -59,15 +60,15 @@ def _fewer(planners: dict[str, Records], budget: int) -> list[Claim]:
     ex = needed.pop("Ex", np.empty(0))
     claims = []
     for name, others in needed.items():
-        told = min(len(ex), len(others)) >= FEWEST
-        chance = float(mannwhitneyu(ex, others, alternative="less").pvalue) if told else 1.0
+        decided = min(len(ex), len(others)) >= FEWEST_PAIRS
+        chance = float(mannwhitneyu(ex, others, alternative="less").pvalue) if decided else 1.0
         medians = {f"median, {one}": float(np.median(values)) if len(values) else None
                    for one, values in (("Ex", ex), (name, others))}
-        claims.append(Claim(f"Ex needs fewer transitions than {name} (Mann-Whitney, p < {SURE})",
-                            chance < SURE if told else None,
+        claims.append(Claim(f"Ex needs fewer transitions than {name} (Mann-Whitney, p < {SIGNIFICANCE})",
+                            chance < SIGNIFICANCE if decided else None,
                             {**medians, f"solved, {name}": rate((others < budget).sum(), len(others)), "p": chance},
                             FIGURE if name == "RRT-NH" else "beyond the thesis",
-                            "" if told else f"fewer than {FEWEST} seeds: no test can tell"))
+                            "" if decided else f"fewer than {FEWEST_PAIRS} seeds: no test can decide"))
     return claims
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import LogNorm
 
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.by_group import rates_figure
 from pbcs_ompl.figures.canvas import save
 from pbcs_ompl.figures.maze import legend_below, stage
@@ -30,46 +30,48 @@ def analyse(records: Records, figures: Path) -> list[Claim]:
     return claims
 
 
-def _arrive(records: Records, label: str, *, reward: str = "sparse", discount: float | None = None) -> dict[str, Any]:
+def _success_rate(records: Records, label: str, *, reward: str = "sparse",
+                  discount: float | None = None) -> dict[str, Any]:
     chosen = [record for record in records if (record["label"], record["reward"]) == (label, reward)
               and discount in (None, record["discount"])]
-    return rate(sum(record["arrives"] for record in chosen), len(chosen))
+    return rate(sum(record["succeeds"] for record in chosen), len(chosen))
 
 
 def _more(claim: str, one: tuple[str, dict[str, Any]], other: tuple[str, dict[str, Any]], source: str) -> Claim:
     """Claim that the first rate is the higher one."""
-    told = one[1]["n"] and other[1]["n"]
+    decided = one[1]["n"] and other[1]["n"]
     apart = one[1]["wilson"][0] > other[1]["wilson"][1] or other[1]["wilson"][0] > one[1]["wilson"][1]
-    return Claim(claim, one[1]["rate"] > other[1]["rate"] if told else None,
+    return Claim(claim, one[1]["rate"] > other[1]["rate"] if decided else None,
                  {**dict((one, other)), "the intervals lie apart": apart}, f"[Matheron2020] {source}",
-                 "" if apart else "the intervals overlap: so few runs do not tell these rates apart")
+                 "" if apart else "the intervals overlap: so few runs cannot separate these rates")
 
 
 def _backplay(records: Records) -> list[Claim]:
-    backplay, alone = _arrive(records, "PB"), _arrive(records, "DDPG")
-    return [_more("PB arrives more often than DDPG alone, from the sparse reward", ("PB", backplay), ("DDPG", alone),
+    backplay, alone = _success_rate(records, "PB"), _success_rate(records, "DDPG")
+    return [_more("PB succeeds more often than DDPG alone, from the sparse reward", ("PB", backplay), ("DDPG", alone),
                   "5.6, Fig. 5.3"),
             Claim("even in the 2x2 maze PB regularly fails (in at least one run of ten)",
-                  backplay["rate"] <= 0.9 if backplay["n"] else None, {"arrives": backplay}, "[Matheron2020] 5.6")]
+                  backplay["rate"] <= 0.9 if backplay["n"] else None, {"succeeds": backplay}, "[Matheron2020] 5.6")]
 
 
 def _discount(records: Records) -> list[Claim]:
-    rates = {(label, discount): _arrive(records, label, discount=discount)
+    rates = {(label, discount): _success_rate(records, label, discount=discount)
              for label in ("PB", "DDPG") for discount in (LOW, HIGH)}
     alone = rates["DDPG", LOW], rates["DDPG", HIGH]
-    return [_more(f"PB arrives more often with the discount {LOW} than with {HIGH}", (f"{LOW}", rates["PB", LOW]),
+    return [_more(f"PB succeeds more often with the discount {LOW} than with {HIGH}", (f"{LOW}", rates["PB", LOW]),
                   (f"{HIGH}", rates["PB", HIGH]), "5.5, Fig. 5.2"),
-            Claim(f"DDPG alone arrives no more often with {LOW} than with {HIGH}",
+            Claim(f"DDPG alone succeeds no more often with {LOW} than with {HIGH}",
                   alone[0]["rate"] <= alone[1]["rate"] if alone[0]["n"] and alone[1]["n"] else None,
                   {f"{LOW}": alone[0], f"{HIGH}": alone[1]}, "[Matheron2020] 5.5, Fig. 5.2")]
 
 
 def _shaping(records: Records) -> list[Claim]:
     def rates(label: str) -> list[tuple[str, dict[str, Any]]]:
-        return [(reward, _arrive(records, label, reward=reward)) for reward in ("sparse", "shaped")]
+        return [(reward, _success_rate(records, label, reward=reward)) for reward in ("sparse", "shaped")]
 
-    return [_more("the shaped reward makes DDPG alone arrive less often", *rates("DDPG"), "7.2.3"),
-            _more("the shaped reward makes PB arrive more often", *reversed(rates("PB")), "7.2.3, Fig. 7.1")]
+    (sparse, shaped), (sparse_pb, shaped_pb) = rates("DDPG"), rates("PB")
+    return [_more("the shaped reward makes DDPG alone succeed less often", sparse, shaped, "7.2.3"),
+            _more("the shaped reward makes PB succeed more often", shaped_pb, sparse_pb, "7.2.3, Fig. 7.1")]
 
 
 def _never_found(record: dict[str, Any]) -> Claim:
@@ -85,10 +87,10 @@ def _draw_rates(records: Records, figures: Path) -> None:
     for label in dict.fromkeys(record["label"] for record in records):
         counts[label] = {}
         for discount, reward in dict.fromkeys((record["discount"], record["reward"]) for record in records):
-            found = _arrive(records, label, reward=reward, discount=discount)
+            found = _success_rate(records, label, reward=reward, discount=discount)
             counts[label][f"discount {discount}\n{reward} reward"] = found["successes"], found["n"]
     title = f"2x2 maze, at most {records[0]['max_transitions']:,} transitions (Figs. 5.2, 5.3, 7.1)"
-    save(rates_figure(counts, title=title, ylabel="share of runs that arrive"), figures / "rates.png")
+    save(rates_figure(counts, title=title, ylabel="share of runs that succeed"), figures / "rates.png")
 
 
 def _draw_visits(record: dict[str, Any], figures: Path) -> None:

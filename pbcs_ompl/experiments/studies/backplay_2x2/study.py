@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.agents import DDPG, DDPGSettings, EpsilonGreedy
-from pbcs_ompl.experiments.study.stacked_training import LoopSettings, StackedTraining
-from pbcs_ompl.experiments.study.trained import trained
+from pbcs_ompl.experiments.stacked_training import LoopSettings, StackedTraining
+from pbcs_ompl.experiments.training_run import trained
 from pbcs_ompl.resettable import make
 
 MAZE = {"size": 2}
@@ -38,7 +38,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _alone(settings: dict[str, Any]) -> dict[str, Any]:
-    """Train DDPG alone from the sparse reward; count its visits and take down when it meets the reward first."""
+    """Train DDPG alone from the sparse reward; count its visits and record when it meets the reward first."""
     model, steps = make("pbcs/Maze-v0", MAZE), settings["steps"]
     agent = DDPG(model.observation_size, model.action_low, model.action_high, seeds=settings["seeds"],
                  settings=DDPGSettings.from_preset(settings["preset"], discount=settings["discount"]))
@@ -48,5 +48,6 @@ def _alone(settings: dict[str, Any]) -> dict[str, Any]:
     # The maze's observations are its states.
     visited = training.agent.state_dict([0])["replay/rows"][0, :, :model.observation_size]
     edges = [np.linspace(low, high, BINS + 1) for low, high in zip(model.state_low, model.state_high, strict=True)]
-    visits, *_ = np.histogram2d(*visited.T, bins=edges)
+    x, y = visited.T
+    visits, *_ = np.histogram2d(x, y, bins=edges)
     return {**settings, "first_reward": curves.first_reward.tolist(), "visits": visits.astype(int).tolist()}

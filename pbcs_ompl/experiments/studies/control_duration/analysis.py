@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.study import Claim, rate
-from pbcs_ompl.experiments.study.paired import greater
+from pbcs_ompl.experiments.claims import Claim, greater, rate
 from pbcs_ompl.figures.by_group import values_figure
 from pbcs_ompl.figures.canvas import save
 

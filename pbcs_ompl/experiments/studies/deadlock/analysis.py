@@ -7,22 +7,23 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.core.statistics import wilson
-from pbcs_ompl.experiments.study import Claim, rate
-from pbcs_ompl.experiments.study.joined import joined_first_rewards, joined_observed, joined_rows, joined_success
+from pbcs_ompl.experiments.claims import Claim, rate
+from pbcs_ompl.experiments.stacked_training import joined_first_rewards, joined_observed, joined_rows, joined_success
 from pbcs_ompl.figures.canvas import new_figure, save
 from pbcs_ompl.figures.diagnostics import critic_map_figure, curves_figure, slices_figure, success_figure
 
 EARLY = 50
 SATURATED = 0.099
 GREEDY, OU = "ddpg-epsilon-greedy", "ddpg-ornstein-uhlenbeck"
-CURES = {"ddpg-argmax-epsilon-greedy": ("DDPG-argmax", "Fig. 6.10(a)"), "sac-epsilon-greedy": ("SAC", "Fig. 6.10(b)"),
-         "ddpg-regression-epsilon-greedy": ("DDPG with the actor's update by regression", "6.6.3, Eq. 6.5")}
+VARIANTS = {"ddpg-argmax-epsilon-greedy": ("DDPG-argmax", "Fig. 6.10(a)"),
+            "sac-epsilon-greedy": ("SAC", "Fig. 6.10(b)"),
+            "ddpg-regression-epsilon-greedy": ("DDPG with the actor's update by regression", "6.6.3, Eq. 6.5")}
 TD3 = "td3-epsilon-greedy"
 OBSERVED = {"saturation": "saturated actions", "flat_share": "flat share", "deadlock_index": "deadlock index",
             "distance_to_returns": "mean |Q - Q^π|"}
 SLICED_STATES = (0.0, 0.05, 0.1, 0.3)
 BINS = (0, 50, 100, 200, 400, 800, 1600)
-"""Steps of the first reward that are told apart, as powers of two of the longest episode."""
+"""Steps of the first reward that are distinguished, as powers of two of the longest episode."""
 MINI_BATCHES = 50 * 100
 """Transitions that are drawn after an episode without the reward: 50 mini-batches of 100."""
 
@@ -60,8 +61,11 @@ def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
     names = dict.fromkeys(record["variant"] for record in records if record["variant"] != "drift")
     variants = {name: Variant([record for record in records if record["variant"] == name]) for name in names}
     drift = next((record for record in records if record["variant"] == "drift"), None)
-    _draw(variants, drift, figures)
-    checks = (_noises, _thesis_rates, _early, _late, _rewards_are_there, _stuck, _expert, _cures, _td3)
+    if variants:
+        _draw(variants, figures)
+    if drift is not None:
+        _draw_drift(drift, figures)
+    checks = (_noises, _thesis_rates, _early, _late, _rewards_are_there, _stuck, _expert, _variants, _td3)
     claims = [claim for check in checks for claim in check(variants)]
     return claims if drift is None else [*claims, *_drift(drift)]
 
@@ -104,11 +108,11 @@ def _late(variants: dict[str, Variant]) -> list[Claim]:
             chosen = variants[name]
             early = rate((chosen.early & ~chosen.failed).sum(), chosen.early.sum())
             late = rate((~chosen.early & ~chosen.failed).sum(), (~chosen.early).sum())
-            told = chosen.failed.any() and early["n"] and late["n"]
+            decided = chosen.failed.any() and early["n"] and late["n"]
             claims.append(Claim(f"{name} is less often solved when the reward is found after the first {EARLY} steps",
-                                bool(late["rate"] < early["rate"]) if told else None,
+                                bool(late["rate"] < early["rate"]) if decided else None,
                                 {"solved, found early": early, "solved, found late or never": late},
-                                "[Matheron2020] Fig. 6.3(b)", "" if told else "no seed failed"))
+                                "[Matheron2020] Fig. 6.3(b)", "" if decided else "no seed failed"))
     return claims
 
 
@@ -134,17 +138,17 @@ def _stuck(variants: dict[str, Variant]) -> list[Claim]:
              for name in ("saturation", "deadlock_index", "distance_to_returns")}
     saturated, stuck, come = (parts["saturation"] > 0.9, parts["deadlock_index"] > 0.0,
                               parts["distance_to_returns"] < 0.1)
-    told = len(saturated) > 0
-    note = "" if told else "no seed failed after it had met the reward"
+    decided = len(saturated) > 0
+    note = "" if decided else "no seed failed after it had met the reward"
     return [Claim("DDPG's failed seeds that have met the reward have a saturated actor (over 90 % of the actions)",
-                  bool(saturated.all()) if told else None, {"saturated": rate(saturated.sum(), len(saturated))},
+                  bool(saturated.all()) if decided else None, {"saturated": rate(saturated.sum(), len(saturated))},
                   "[Matheron2020] 6.2.2", note),
             Claim("and a critic that knows better actions but shows no way to them (deadlock index > 0)",
-                  bool(stuck.all()) if told else None,
+                  bool(stuck.all()) if decided else None,
                   {"stuck": rate(stuck.sum(), len(stuck)), "indices": parts["deadlock_index"].round(3).tolist()},
                   "[Matheron2020] 6.3.2, Theorems 1 and 2", note),
             Claim("a critic that is Q^pi, what their actor earns (mean |Q - Q^pi| below 0.1, the reward being 1)",
-                  bool(come.all()) if told else None,
+                  bool(come.all()) if decided else None,
                   {"below 0.1": rate(come.sum(), len(come)), "means": parts["distance_to_returns"].round(3).tolist()},
                   "[Matheron2020] 6.4.1", note)]
 
@@ -166,11 +170,11 @@ def _expert(variants: dict[str, Variant]) -> list[Claim]:
                   "" if remain["n"] else "no seed was unsolved then")]
 
 
-def _cures(variants: dict[str, Variant]) -> list[Claim]:
+def _variants(variants: dict[str, Variant]) -> list[Claim]:
     return [Claim(f"{name} reaches 100 %", variants[variant].failures["successes"] == 0,
                   {"failures": variants[variant].failures, "steps until most are solved": variants[variant].half},
                   f"[Matheron2020] {source}")
-            for variant, (name, source) in CURES.items() if variant in variants]
+            for variant, (name, source) in VARIANTS.items() if variant in variants]
 
 
 def _td3(variants: dict[str, Variant]) -> list[Claim]:
@@ -194,7 +198,13 @@ def _drift(record: dict[str, Any]) -> list[Claim]:
                   "[Matheron2020] Fig. 6.4(b)")]
 
 
-def _draw(variants: dict[str, Variant], drift: dict[str, Any] | None, figures: Path) -> None:
+def _draw_drift(drift: dict[str, Any], figures: Path) -> None:
+    panels = {"max |Q|": np.array(drift["largest_value"]), "max |π|": np.array(drift["largest_action"])}
+    updates = np.array(drift["updates"], dtype=np.float64)
+    save(curves_figure(updates, panels, title="Drift: no reward at all (Fig. 6.4)"), figures / "drift.png")
+
+
+def _draw(variants: dict[str, Variant], figures: Path) -> None:
     curves = {name: (chosen.steps, chosen.success) for name, chosen in variants.items()}
     plain = {name: curve for name, curve in curves.items() if variants[name].expert_after is None}
     pairs = {name: curve for name, curve in curves.items() if f"{name}-expert" in curves or name not in plain}
@@ -207,15 +217,12 @@ def _draw(variants: dict[str, Variant], drift: dict[str, Any] | None, figures: P
              figures / "expert.png")
     _draw_first_rewards(variants, figures)
     _draw_rewarded(variants, figures)
-    if drift is not None:
-        panels = {"max |Q|": np.array(drift["largest_value"]), "max |π|": np.array(drift["largest_action"])}
-        save(curves_figure(np.array(drift["updates"]), panels, title="Drift: no reward at all (Fig. 6.4)"),
-             figures / "drift.png")
     for name, (chosen, failed) in _failed_with_reward(variants).items():
         observed = [record["observed"] for record in chosen.records]
         panels = {title: joined_rows(observed, key, len(chosen.steps))[:, failed] for key, title in OBSERVED.items()}
         title = f"{name}: failed seeds that have met the reward"
-        save(curves_figure(chosen.steps, panels, xlabel="steps", title=title), figures / f"diagnostics-{name}.png")
+        save(curves_figure(chosen.steps.astype(np.float64), panels, xlabel="steps", title=title),
+             figures / f"diagnostics-{name}.png")
         seeds = np.concatenate([record["seeds"] for record in chosen.records])[failed]
         one = next((part for record in chosen.records for part in record["critics"] if part["seed"] in seeds), None)
         if one is not None:
@@ -223,7 +230,7 @@ def _draw(variants: dict[str, Variant], drift: dict[str, Any] | None, figures: P
 
 
 def _leaving(variants: dict[str, Variant]) -> str:
-    """Return the line that a figure of successes owes its reader."""
+    """Return the line of a title that says when seeds leave."""
     patience = {record["loop"]["patience"] for chosen in variants.values() for record in chosen.records}
     return f"\nA seed leaves when solved in {max(patience)} evaluations in a row, and counts as solved from then on."
 
@@ -262,7 +269,8 @@ def _draw_rewarded(variants: dict[str, Variant], figures: Path) -> None:
     panels = {f"failed, {name}": MINI_BATCHES * joined_rows(chosen.records, "rewarded", len(chosen.steps))[:, rows]
               for name, (chosen, rows) in failed.items()}
     for chosen, _ in list(failed.values())[:1]:
-        save(curves_figure(chosen.steps, panels, xlabel="steps", title=title), figures / "rewarded.png")
+        save(curves_figure(chosen.steps.astype(np.float64), panels, xlabel="steps", title=title),
+             figures / "rewarded.png")
 
 
 def _draw_critic(name: str, one: dict[str, Any], figures: Path) -> None:

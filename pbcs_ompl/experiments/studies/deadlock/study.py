@@ -9,11 +9,10 @@ from pbcs_ompl.agents.noise import make_noise
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.registry import load
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.diagnostics import value_slices
-from pbcs_ompl.experiments.study.joined import chunks
-from pbcs_ompl.experiments.study.observers import Probe
-from pbcs_ompl.experiments.study.stacked_training import LoopSettings, StackedTraining
+from pbcs_ompl.experiments.diagnostic_batch import DiagnosticBatch
+from pbcs_ompl.experiments.stacked_training import LoopSettings, StackedTraining, chunks
 from pbcs_ompl.resettable import make
 
 MAPPED_STATES = np.linspace(0.0, 1.0, 101)
@@ -37,7 +36,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     if settings["variant"] == "drift":
         return _drift(settings)
     model = make("pbcs/Toy1D-v0")
-    agent, probe = _agent(settings, model, settings["seeds"]), Probe(model)
+    agent, probe = _agent(settings, model, settings["seeds"]), DiagnosticBatch(model)
     discount = settings["agent_settings"]["discount"]
     observers = probe.observers() | {
         "distance_to_returns": lambda agent: probe.distance_to_returns(agent, discount, HORIZON)}
@@ -54,13 +53,15 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
 
 def _agent(settings: dict[str, Any], model: ResettableModel, seeds: list[int]) -> StackedAgent:
     kind = load("agent", settings["agent"])
-    # A GPU's update would be compiled anew each time that the stack shrinks.
-    return kind(model.observation_size, model.action_low, model.action_high, seeds=seeds, device=settings["device"],
-                settings=kind.settings_type(**settings["agent_settings"]),
-                compile="auto" if settings["device"] == "cpu" else False)
+    # A GPU's update would be compiled again each time that the stack shrinks.
+    agent: StackedAgent = kind(model.observation_size, model.action_low, model.action_high, seeds=seeds,
+                               device=settings["device"],
+                               settings=kind.settings_type(**settings["agent_settings"]),
+                               compile="auto" if settings["device"] == "cpu" else False)
+    return agent
 
 
-def _critics(agent: StackedAgent, failed: Array) -> list[dict[str, Any]]:
+def _critics(agent: StackedAgent, failed: IndexArray) -> list[dict[str, Any]]:
     """Return Q along the states and the actions, and the actor's actions, of some failed seeds of the stack."""
     states = np.broadcast_to(MAPPED_STATES[:, None], (len(agent.seeds), len(MAPPED_STATES), 1))
     line, values = value_slices(agent.value, states, agent.action_low, agent.action_high)
@@ -71,19 +72,20 @@ def _critics(agent: StackedAgent, failed: Array) -> list[dict[str, Any]]:
 
 def _fill_without_reward(agent: StackedAgent, count: int) -> None:
     """Fill the replay buffers with random transitions of Drift."""
-    model, shape = make("pbcs/Drift-v0"), (len(agent.seeds) * count, 1)
+    model, flat = make("pbcs/Drift-v0"), (len(agent.seeds) * count, 1)
     rng = np.random.default_rng(0)
-    states, controls = rng.uniform(0.0, 1.0, shape), rng.uniform(model.action_low, model.action_high, shape)
+    states, controls = rng.uniform(0.0, 1.0, flat), rng.uniform(model.action_low, model.action_high, flat)
     outcome = model.transition(states, controls)
-    agent.add_transitions(*(values.reshape(len(agent.seeds), count, *values.shape[1:]) for values in (
-        states, controls, outcome.rewards, outcome.states, outcome.terminated)))
+    shape = (len(agent.seeds), count)
+    agent.add_transitions(states.reshape(*shape, -1), controls.reshape(*shape, -1), outcome.rewards.reshape(shape),
+                   outcome.states.reshape(*shape, -1), outcome.terminated.reshape(shape))
 
 
 def _drift(settings: dict[str, Any]) -> dict[str, Any]:
-    """Train on random transitions without any reward; take down how far actor and critic go."""
+    """Train on random transitions without any reward; record how far actor and critic drift."""
     model, drift = make("pbcs/Drift-v0"), settings["drift"]
     seeds = list(range(drift["seeds"]))
-    agent, probe = _agent(settings, model, seeds), Probe(model)
+    agent, probe = _agent(settings, model, seeds), DiagnosticBatch(model)
     _fill_without_reward(agent, drift["transitions"])
     rows = {"largest_value": [probe.largest_value(agent)], "largest_action": [probe.largest_action(agent)]}
     for _ in range(drift["updates"] // drift["every"]):

@@ -12,7 +12,7 @@ from pbcs_ompl.skills.exploration import without_goal
 
 PICTURED_SEED = 0
 SAMPLES = 8
-"""Points along each edge of a cell that tell how much of it can be reached."""
+"""Points along each edge of a cell, by which the share of it that can be reached is estimated."""
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:

@@ -8,12 +8,12 @@ import numpy as np
 from scipy.stats import mannwhitneyu, t
 
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.canvas import new_figure, save
 
 LATE = 10
 """Episodes of the actor itself that say what has become of it; the thesis smooths over as many."""
-LEVEL, TOO_FEW = 0.05, "too few seeds to tell"
+LEVEL, TOO_FEW = 0.05, "too few seeds to decide"
 GOOD, SOLVED = 0.975, 0.95
 """Shares of the best return: the thesis asks the first of the good policy; we call a mean above the second solved."""
 
@@ -60,7 +60,8 @@ def _found(variants: dict[str, Variant]) -> list[Claim]:
     found = {name: rate((chosen.returns > 0.0).any(axis=1).sum(), chosen.seeds) for name, chosen in variants.items()
              if not chosen.expert.size}
     return [Claim("without priming, DDPG and DDPG-argmax find rewards, in every seed",
-                  all(numbers["rate"] == 1.0 for numbers in found.values()), found, "[Matheron2020] 6.7")]
+                  all(numbers["rate"] == 1.0 for numbers in found.values()) if found else None, found,
+                  "[Matheron2020] 6.7")]
 
 
 def _compared(variants: dict[str, Variant]) -> list[Claim]:

@@ -13,13 +13,15 @@ from pbcs_ompl.agents import TD3, Policy, TD3Settings
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import write_arrays
+from pbcs_ompl.results.files import write_arrays
 
 EXPERT = Path(__file__).with_name("expert.npz")
 EPISODE, EPISODES, WARM_UP, BLOCK = 1000, 500, 10, 50
 CONTROL_COST, SIGMA, GOOD = 0.1, 0.1, 1950.0
 STARTS = 10
 X = 1
+STEP_SECONDS = 0.05
+"""The time of one step of HalfCheetah."""
 
 
 def returns(model: ResettableModel, policy: Policy, starts: Array) -> Array:
@@ -37,7 +39,7 @@ def main(seed: int) -> None:
     low, high = model.action_low, model.action_high
     agent = TD3(model.observation_size, low, high, seeds=(seed,), settings=TD3Settings(
         hidden=(128, 128), discount=0.99, batch_size=128))
-    starts, seconds = np.array([model.initial_state(index) for index in range(STARTS)]), model.env.step_seconds
+    starts = np.array([model.initial_state(index) for index in range(STARTS)])
     for episode in range(EPISODES):
         state = model.initial_state(seed + episode)[None]
         for _ in range(EPISODE // BLOCK):
@@ -48,10 +50,11 @@ def main(seed: int) -> None:
                 action = (rng.uniform(low, high)[None] if episode < WARM_UP else
                           np.clip(agent.act(observation[None])[0] + noise, low, high))
                 after = model.transition(state, action).states
-                reward = (after[:, X] - state[:, X]) / seconds - CONTROL_COST * np.square(action).sum(axis=1)
-                rows.append((observation, action, reward, model.observe(after), np.zeros(1)))
+                reward = (after[:, X] - state[:, X]) / STEP_SECONDS - CONTROL_COST * np.square(action).sum(axis=1)
+                rows.append((observation, action, reward, model.observe(after)))
                 state = after
-            agent.add_transitions(*(np.stack(part, axis=1) for part in zip(*rows, strict=True)))
+            observations, actions, rewards, following = (np.stack(part, axis=1) for part in zip(*rows, strict=True))
+            agent.add_transitions(observations, actions, rewards, following, np.zeros((1, BLOCK), dtype=np.bool_))
             if episode >= WARM_UP:
                 agent.train(BLOCK)
         if episode % 10 == 9:

@@ -15,9 +15,9 @@ from pbcs_ompl.agents.update import one_thread
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.registry import load
 from pbcs_ompl.core.seeding import SeedTree
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.folder import read_arrays
+from pbcs_ompl.results.files import read_arrays
 
 EXPERT = "expert.npz"
 
@@ -51,17 +51,20 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
 
 def _episode(model: ResettableModel, actor: Policy, start: int, noise: float, rng: np.random.Generator,
              agent: StackedAgent | None) -> float:
-    """Run an episode from `reset(seed=start)`, which `agent` remembers, and return its return."""
+    """Run an episode from `reset(seed=start)`, which `agent` stores, and return its return."""
     low, high = model.action_low, model.action_high
-    state, parts = model.initial_state(start)[None], []
+    state = model.initial_state(start)[None]
+    parts: list[tuple[Array, ...]] = []
+    terminals: list[BoolArray] = []
     for _ in range(model.max_episode_steps):
         observation = model.observe(state)
         wobble = noise * rng.uniform(-1.0, 1.0, low.shape) * (high - low) / 2.0
         action = np.clip(actor.act(observation) + wobble, low, high)
         outcome = model.transition(state, action)
-        parts.append((observation, action, outcome.rewards, model.observe(outcome.states), outcome.terminated))
+        parts.append((observation, action, outcome.rewards, model.observe(outcome.states)))
+        terminals.append(outcome.terminated)
         state = outcome.states
-    episode: list[Array] = [np.stack(part, axis=1) for part in zip(*parts, strict=True)]
+    observations, actions, rewards, following = (np.stack(part, axis=1) for part in zip(*parts, strict=True))
     if agent is not None:
-        agent.add_transitions(*episode)
-    return float(episode[2].sum())
+        agent.add_transitions(observations, actions, rewards, following, np.stack(terminals, axis=1))
+    return float(rewards.sum())

@@ -7,8 +7,7 @@ import numpy as np
 from matplotlib.patches import Circle
 from scipy.stats import binomtest
 
-from pbcs_ompl.experiments.study import Claim, rate
-from pbcs_ompl.experiments.study.paired import FEWEST, SURE
+from pbcs_ompl.experiments.claims import FEWEST_PAIRS, SIGNIFICANCE, Claim, rate
 from pbcs_ompl.figures.by_group import rates_figure, values_figure
 from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED, new_figure, save
 from pbcs_ompl.figures.chain import chain_figure
@@ -20,7 +19,7 @@ ALONE = ("DDPG", "TD3")
 BARS = (((2, 3, 4, 5, 7), 0.95, "[Matheron2020] 7.4: PBCS solves mazes up to 7x7; the bar is ours"),
         ((10, 15), 0.8, "ours: beyond [Matheron2020]"))
 MILLION = 1_000_000
-"""[Matheron2020] 5.6: a run succeeds within so many transitions, planning included."""
+"""[Matheron2020] 5.6: a run has to succeed within this many transitions, planning included."""
 COLOURS = {True: "#e3f4e3", False: "#fbe3e3"}
 """Backgrounds of solved and unsolved pictures, as in Fig. 7.3."""
 
@@ -50,7 +49,7 @@ def _solved(records: Records, key: str = "solved") -> dict[str, Any]:
 def _any_solved(records: Records) -> bool | None:
     """Return whether any of them is solved; None when there are too few to say that there is none."""
     solved = any(record["solved"] for record in records)
-    return solved if solved or len(records) >= FEWEST else None
+    return solved if solved or len(records) >= FEWEST_PAIRS else None
 
 
 def _by_size(records: Records, label: str) -> dict[str, Any]:
@@ -73,7 +72,7 @@ def _bars(records: Records) -> list[Claim]:
 def _reason(record: dict[str, Any]) -> str:
     if record["stalled"]:
         return str(record["stalled"])
-    return (f"{record['success_rate']:.0%} of the noisy executions arrive, "
+    return (f"{record['success_rate']:.0%} of the noisy executions succeed, "
             f"{record['nominal_success_rate']:.0%} of those without noise")
 
 
@@ -97,7 +96,7 @@ def _fails_from_3x3(records: Records, label: str, name: str) -> Claim:
 
 
 def _counts(records: Records) -> dict[str, Any]:
-    return {"solved": _solved(records), "arrive once, at the end, without noise": _solved(records, "arrives")}
+    return {"solved": _solved(records), "succeed once, at the end, without noise": _solved(records, "succeeds")}
 
 
 def _backplay(records: Records) -> list[Claim]:
@@ -105,9 +104,11 @@ def _backplay(records: Records) -> list[Claim]:
     backplay, alone = _solved(small), _solved(_of(records, "DDPG", 2))
     return [_fails_from_3x3(records, "PB", "PB"),
             Claim("PB regularly fails in 2x2 mazes (in at least one run of ten)",
-                  backplay["rate"] <= 0.9 if len(small) >= FEWEST else None, _counts(small), "[Matheron2020] 5.6"),
+                  backplay["rate"] <= 0.9 if len(small) >= FEWEST_PAIRS else None, _counts(small),
+                  "[Matheron2020] 5.6"),
             Claim("PB solves 2x2 mazes much more often than DDPG alone (the intervals lie apart)",
-                  backplay["wilson"][0] > alone["wilson"][1] if min(backplay["n"], alone["n"]) >= FEWEST else None,
+                  backplay["wilson"][0] > alone["wilson"][1] if min(backplay["n"], alone["n"]) >= FEWEST_PAIRS
+                  else None,
                   {"PB": backplay, "DDPG": alone}, "[Matheron2020] 5.6, Fig. 5.3")]
 
 
@@ -120,8 +121,9 @@ def _compared(records: Records) -> list[Claim]:
                  if (r["size"], r["seed"]) in pbcs]
         ours, theirs = (sum(one > other for one, other in pairs), sum(one < other for one, other in pairs))
         chance = binomtest(ours, ours + theirs, alternative="greater").pvalue if ours + theirs else 1.0
-        claims.append(Claim(f"within the same million transitions PBCS solves more mazes than {label} (p < {SURE})",
-                            bool(chance < SURE) if len(pairs) >= FEWEST else None,
+        claims.append(Claim(f"within the same million transitions PBCS solves more mazes than {label} "
+                            f"(p < {SIGNIFICANCE})",
+                            bool(chance < SIGNIFICANCE) if len(pairs) >= FEWEST_PAIRS else None,
                             {"PBCS": rate(sum(one for one, _ in pairs), len(pairs)),
                              label: rate(sum(other for _, other in pairs), len(pairs)),
                              f"only PBCS, only {label}": [ours, theirs], "p (McNemar, exact)": float(chance)},

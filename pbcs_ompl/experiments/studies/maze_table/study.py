@@ -2,9 +2,10 @@
 
 from typing import Any
 
-from pbcs_ompl.experiments.study.trained import trained
+from pbcs_ompl.bridge.trajectory import Trajectory
+from pbcs_ompl.experiments.training_run import trained
 from pbcs_ompl.resettable import make
-from pbcs_ompl.skills import TrainResult
+from pbcs_ompl.skills.chain import SkillChain
 
 PICTURED_INDEX = 0
 
@@ -21,18 +22,18 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
-    """Train once; take down what it cost and whether the policy arrives."""
+    """Train once; record what it cost and whether the policy succeeds."""
     size, seed = settings["size"], settings["seed"]
     kwargs = {"size": size, "wall_penalty": settings["wall_penalty"]} | ({"maze_seed": seed} if size > 3 else {})
     changes = {} if settings["method"] == "pbcs" else {"max_steps": settings["episode_steps"]}
     record, result = trained("pbcs/Maze-v0", kwargs, settings=changes, seed=seed,
                              **{key: settings[key] for key in ("method", "agent", "preset", "max_transitions")})
-    pictured = settings["index"] == PICTURED_INDEX and result.chain is not None
-    return settings | record | (_picture(result, kwargs) if pictured else {})
+    if settings["index"] == PICTURED_INDEX and result.chain is not None:
+        return settings | record | _picture(result.chain, result.trajectory, kwargs)
+    return settings | record
 
 
-def _picture(result: TrainResult, kwargs: dict[str, Any]) -> dict[str, Any]:
-    return {"plan": None if result.trajectory is None else result.trajectory.states.tolist(),
-            "rollout": result.chain.rollout(make("pbcs/Maze-v0", kwargs)).tolist(),
-            "activations": [[skill.activation.center.tolist(), skill.activation.radius]
-                            for skill in result.chain.skills]}
+def _picture(chain: SkillChain, plan: Trajectory | None, kwargs: dict[str, Any]) -> dict[str, Any]:
+    return {"plan": None if plan is None else plan.states.tolist(),
+            "rollout": chain.rollout(make("pbcs/Maze-v0", kwargs)).tolist(),
+            "activations": [[skill.activation.center.tolist(), skill.activation.radius] for skill in chain.skills]}

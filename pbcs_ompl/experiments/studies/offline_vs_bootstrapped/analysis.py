@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.core.types import Array
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.canvas import new_figure, save
 from pbcs_ompl.figures.critic import critic_figure
 from pbcs_ompl.figures.diagnostics import success_figure
@@ -72,7 +73,7 @@ def _little_of_the_wall(record: dict[str, Any], figures: Path) -> Claim:
     _draw_mini_batch(record, figures)
     count = record["explored"] * len(record["seeds"])
     inside = rate(sum(record["stopped_inside"]), count)
-    return Claim("at most one in twenty of Ex's transitions tells of the inner wall of the 2x2 maze",
+    return Claim("at most one in twenty of Ex's transitions shows the inner wall of the 2x2 maze",
                  inside["rate"] <= 0.05, {"stopped by the inner wall": inside,
                                           "stopped by any wall": rate(sum(record["stopped"]), count)},
                  "[Matheron2020] 4.7, Fig. 4.7", "what can be learnt from them all the same: see offline DDPG")
@@ -85,8 +86,9 @@ def _draw_mini_batch(record: dict[str, Any], figures: Path) -> None:
     axes.remove()
     left, right = figure.subplots(1, 2)
     furnish(left, model)
+    segments = list(np.stack([before, after], axis=1))
     for panel in (left, right):
-        panel.add_collection(LineCollection(np.stack([before, after], axis=1), color="C0", linewidth=1.2, zorder=3))
+        panel.add_collection(LineCollection(segments, color="C0", linewidth=1.2, zorder=3))
         panel.plot(*after.T, ".", color="C0", markersize=3, zorder=3)
         panel.set(xlim=left.get_xlim(), ylim=left.get_ylim(), aspect="equal")
     figure.suptitle(f"{len(before)} of {record['explored']:,} transitions of Ex, with and without the maze (Fig. 4.7)",
@@ -99,21 +101,26 @@ def _draw(record: dict[str, Any], figures: Path) -> None:
     for picture in record["pictures"]:
         values, actions = np.array(picture["values"]), np.array(picture["actions"])
         policy = _looked_up(actions, float(model.state_high[0]))
-        value = _looked_up(values[:, None], float(model.state_high[0]))
+        value = _values_of_states(_looked_up(values[:, None], float(model.state_high[0])))
         title = (f"{record['variant']}, seed {record['seeds'][0]}: {record['explored']:,} transitions of Ex,\n"
                  f"{record['updates']:,} updates on them, {picture['steps']:,} steps (Fig. {record['figure']})")
-        figure = critic_figure(model, policy, lambda observations, _, value=value: value(observations)[:, 0],
-                               rollout=np.array(picture["rollout"]), title=title)
+        figure = critic_figure(model, policy, value, rollout=np.array(picture["rollout"]), title=title)
         ending = "" if picture["steps"] == record["steps"] else f"-{picture['steps']}"
         save(figure, figures / f"critic-{record['variant']}{ending}.png")
 
 
-def _looked_up(table: np.ndarray, extent: float) -> Callable[[np.ndarray], np.ndarray]:
+def _values_of_states(look_up: Callable[[Array], Array]) -> Callable[[Array, Array], Array]:
+    """Return a critic that ignores the actions."""
+    return lambda observations, _: look_up(observations)[:, 0]
+
+
+def _looked_up(table: Array, extent: float) -> Callable[[Array], Array]:
     """Return a function of positions that looks them up in a table of a square grid, row by row."""
     count = int(np.sqrt(len(table)))
 
-    def look_up(positions: np.ndarray) -> np.ndarray:
+    def look_up(positions: Array) -> Array:
         column, row = np.clip((positions / extent * count).astype(int), 0, count - 1).T
-        return table[row * count + column]
+        values: Array = table[row * count + column]
+        return values
 
     return look_up

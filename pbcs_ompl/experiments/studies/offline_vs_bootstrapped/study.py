@@ -10,8 +10,7 @@ from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.agents.update import one_thread
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.experiments.study.joined import chunks
-from pbcs_ompl.experiments.study.stacked_training import LoopSettings, StackedTraining, solved
+from pbcs_ompl.experiments.stacked_training import LoopSettings, StackedTraining, chunks, solved
 from pbcs_ompl.resettable import make
 from pbcs_ompl.skills.exploration import explore
 
@@ -71,8 +70,9 @@ def _mini_batches(model: ResettableModel, seeds: list[int], explored: int, count
 def _fill(agent: StackedAgent, model: ResettableModel, count: int) -> None:
     """Fill each seed's replay buffer with an exploration of its own. No state is terminal in chapter 4."""
     found = [explore(model, count, seed + 1) for seed in agent.seeds]
-    agent.add_transitions(*(np.stack([getattr(one, name) for one in found])
-                     for name in ("states", "controls", "rewards", "next_states")), np.zeros((len(found), count)))
+    agent.add_transitions(np.stack([one.states for one in found]), np.stack([one.controls for one in found]),
+                   np.stack([one.rewards for one in found]), np.stack([one.next_states for one in found]),
+                   np.zeros((len(found), count), dtype=np.bool_))
 
 
 def _offline(agent: StackedAgent, model: ResettableModel, settings: dict[str, Any]) -> dict[str, Any]:

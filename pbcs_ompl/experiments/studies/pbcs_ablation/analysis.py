@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.study import Claim, rate
-from pbcs_ompl.experiments.study.paired import greater
+from pbcs_ompl.experiments.claims import Claim, greater, rate
 from pbcs_ompl.figures.by_group import rates_figure, values_figure
 from pbcs_ompl.figures.canvas import save
 
@@ -17,6 +16,8 @@ NAMES = {"alpha": "alpha", "beta": "beta", "radius": "epsilon (radius)"}
 
 def analyse(records: Records, figures: Path) -> list[Claim]:
     """Draw rates, transitions and skills for each value of each parameter; check what the thesis expects of them."""
+    if not records:
+        return []
     for parameter in NAMES:
         _draw(records, parameter, figures)
     return [*_alpha(records), *_beta(records), *_radius(records)]
@@ -51,17 +52,18 @@ def _more(claim: str, records: Records, key: str, parameter: str, values: tuple[
     The number of skills is that of complete chains only.
     """
     swept = _swept(records, parameter)
-    one, other = ({(r["size"], r["seed"]): float(r[key]) for r in swept[value] if key != "skills" or not r["stalled"]}
-                  for value in values)
+    one, other = ({(r["size"], r["seed"]): float(r[key]) for r in swept.get(value, [])
+                   if key != "skills" or not r["stalled"]} for value in values)
     return greater(claim, one, other, (f"{values[0]:g}", f"{values[1]:g}"), source)
 
 
 def _no_worse(claim: str, records: Records, parameter: str, value: float, than: float) -> Claim:
     swept = _swept(records, parameter)
-    one, other = _solved(swept[value]), _solved(swept[than])
-    told = one["n"] and value != than
+    one, other = _solved(swept.get(value, [])), _solved(swept.get(than, []))
+    decided = one["n"] and other["n"] and value != than
     return Claim(f"{claim} (its rate lies in the other's interval, or above)",
-                 one["rate"] >= other["wilson"][0] if told else None, {f"{value:g}": one, f"{than:g}": other}, SOURCE)
+                 one["rate"] >= other["wilson"][0] if decided else None,
+                 {f"{value:g}": one, f"{than:g}": other}, SOURCE)
 
 
 def _alpha(records: Records) -> list[Claim]:
@@ -74,16 +76,18 @@ def _alpha(records: Records) -> list[Claim]:
 
 def _beta(records: Records) -> list[Claim]:
     low, usual, high = _ends(records, "beta")
-    swept = _swept(records, "beta")
+    swept = {value: _swept(records, "beta").get(value, []) for value in (low, usual)}
     few, many = _solved(swept[low]), _solved(swept[usual])
+    decided = few["n"] and many["n"] and low != usual
     return [_more(f"beta = {high:g} costs more transitions than {usual:g}", records, "train_transitions", "beta",
                   (high, usual)),
             _no_worse(f"beta = {high:g} builds chains as well as {usual:g}", records, "beta", high, usual),
             Claim(f"beta = {low:g} leads to chains that fail more often than with {usual:g} (the intervals lie apart)",
-                  few["wilson"][1] < many["wilson"][0] if low != usual else None,
+                  few["wilson"][1] < many["wilson"][0] if decided else None,
                   {f"{low:g}": few, f"{usual:g}": many,
                    **{f"success with random actions, median, {value:g}":
-                      float(np.median([record["success_rate"] for record in swept[value]])) for value in (low, usual)}},
+                      float(np.median([record["success_rate"] for record in runs]))
+                      for value, runs in swept.items() if runs}},
                   SOURCE)]
 
 

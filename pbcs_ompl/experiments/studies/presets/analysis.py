@@ -1,11 +1,11 @@
-"""What a preset costs and what comes of it."""
+"""What a preset costs and what it solves."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.by_group import rates_figure, values_figure
 from pbcs_ompl.figures.canvas import save
 
@@ -16,7 +16,8 @@ OURS = 'ours: what the preset "fast" is for'
 
 def analyse(records: Records, figures: Path) -> list[Claim]:
     """Draw rates, transitions and seconds; compare the presets seed by seed."""
-    _draw(records, figures)
+    if records:
+        _draw(records, figures)
     fast, thesis = ({(r["size"], r["seed"]): r for r in records if r["preset"] == preset} for preset in (FAST, THESIS))
     pairs = [(fast[key], thesis[key]) for key in sorted(fast.keys() & thesis.keys())]
     return [_solves_more(pairs), _literal(pairs), *(_cheaper(pairs, key) for key in ("transitions", "cpu_seconds"))]

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pbcs_ompl.experiments.study.trained import trained
+from pbcs_ompl.experiments.training_run import trained
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.canvas import new_figure, save
 
 OURS = "beyond [Matheron2020], which trains in 2-D mazes only"
@@ -18,7 +18,8 @@ def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
     tasks = {task: [record for record in records if record["task"] == task]
              for task in dict.fromkeys(record["task"] for record in records)}
     solved = {task: rate(sum(record["solved"] for record in chosen), len(chosen)) for task, chosen in tasks.items()}
-    _draw(solved, tasks, figures / "solved.png")
+    if records:
+        _draw(solved, tasks, figures / "solved.png")
     alone = [_most_seeds(task, solved[task], chosen) for task, chosen in tasks.items() if not task.endswith(LEARNT)]
     pairs = [_learnt(task, solved, tasks) for task in tasks if task + LEARNT in tasks]
     return [*alone, *pairs]
@@ -44,11 +45,11 @@ def _medians(records: list[dict[str, Any]]) -> dict[str, Any]:
     """Return medians over all seeds, solved or not, and the success rates under random actions."""
     known = {key: [record[key] for record in records if record[key] is not None] for key in MEDIANS}
     medians = {f"{key}, median": round(float(np.median(values)), 1) for key, values in known.items() if values}
-    return medians | {"arrive with a tenth of random actions": [record["success_rate"] for record in records]}
+    return medians | {"succeed with a tenth of random actions": [record["success_rate"] for record in records]}
 
 
 def _failures(records: list[dict[str, Any]]) -> str:
-    failed = [f"seed {record['seed']}: {record['stalled'] or 'fewer than 95 of 100 noisy executions arrive'}"
+    failed = [f"seed {record['seed']}: {record['stalled'] or 'fewer than 95 of 100 noisy executions succeed'}"
               for record in records if not record["solved"]]
     return "; ".join(failed)
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pbcs_ompl.experiments.study.trained import trained
+from pbcs_ompl.experiments.training_run import trained
 
 KEPT = ("solved", "success_rate", "nominal_success_rate", "steps_median", "skills", "plan_transitions",
         "train_transitions", "updates", "cpu_seconds", "stalled")
@@ -17,7 +17,7 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
-    """Train once; take down what it cost and whether the chain arrives."""
+    """Train once; record what it cost and whether the chain succeeds."""
     options = {key: settings[key] for key in ("planner_kwargs", "preset", "settings", "seed", "max_transitions")}
     record, result = trained(settings["env"], settings["env_kwargs"], **options)
     length = None if result.trajectory is None else result.trajectory.length

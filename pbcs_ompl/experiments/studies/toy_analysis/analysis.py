@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.study import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.canvas import new_figure, save
 
 DEVIATIONS = 4.0
-"""A simulation agrees when it is nowhere further off than so many standard deviations."""
+"""A simulation agrees when it is nowhere further off than this many standard deviations."""
 TITLES = {"walk": "random walk with sink", "p-greedy": "p-greedy random walk with sink, p = 0.1"}
 DENSITIES = {"walk": "Figs. A.1, A.4", "p-greedy": "as Figs. A.1, A.4"}
 SUCCESSES = {"walk": "Fig. A.2", "p-greedy": "Fig. A.3"}

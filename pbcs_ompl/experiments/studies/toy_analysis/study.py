@@ -8,7 +8,7 @@ import numpy as np
 from pbcs_ompl.agents import DDPG
 from pbcs_ompl.agents.noise import EpsilonGreedy, draw_all
 from pbcs_ompl.core.seeding import SeedTree
-from pbcs_ompl.experiments.study.random_walk import densities, simulate
+from pbcs_ompl.experiments.studies.toy_analysis.random_walk import densities, simulate
 from pbcs_ompl.resettable import make
 
 POSITIONS = np.linspace(-1.0, 8.0, 451)
@@ -29,7 +29,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     if settings["kind"] == "agents":
         return _agents(settings)
     share, steps = Fraction(settings["share"]), settings["steps"]
-    exact, total, pictures = [], Fraction(0), {}
+    exact, total, pictures, masses = [], Fraction(0), {}, []
     for step, density in enumerate(densities(steps, share), start=1):
         total += density.found
         exact.append(float(total))
@@ -42,10 +42,10 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     _, positions = simulate(settings["walks"], settings["density_after"], float(share), seed=settings["seed"] + 10**6)
     counts, _ = np.histogram(positions, bins=np.arange(-1.0, 8.0 + BIN / 2, BIN))
     return {**settings, "exact": exact, "found": found.tolist(), "pictures": pictures, "masses": masses,
-            "counts": counts.tolist(), "theorem_5": _theorem_5(steps, float(share))}
+            "counts": counts.tolist(), "theorem_5": theorem_5(steps, float(share))}
 
 
-def _theorem_5(steps: int, share: float) -> list[float]:
+def theorem_5(steps: int, share: float) -> list[float]:
     """Return the probabilities of success by the formula of Theorem 5 as it is printed.
 
     It mixes the densities of the walk without pauses (P_i, P_(i+1)) instead of those of the walk itself.

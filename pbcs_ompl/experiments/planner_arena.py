@@ -1,0 +1,136 @@
+"""A comparison for OMPL's own tools: benchmark logs, one for each environment, and the database of Planner Arena."""
+
+import io
+import json
+import os
+import platform
+import sqlite3
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import redirect_stdout
+from datetime import datetime
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+from ompl.tools import computeViews, readBenchmarkLog
+
+from pbcs_ompl.core.plain import plain
+from pbcs_ompl.experiments.planning_run import folder_of
+from pbcs_ompl.experiments.run import Record
+from pbcs_ompl.experiments.sweep import Sweep
+from pbcs_ompl.results.files import write_errors, write_text
+from pbcs_ompl.results.provenance import provenance
+
+STATUS = ("Unknown status", "Invalid start", "Invalid goal", "Unrecognized goal type", "Timeout",
+          "Approximate solution", "Exact solution", "Crash", "Abort", "Infeasible")
+TIMEOUT, EXACT, CRASH = 4, 6, 7
+PROPERTIES: dict[str, Callable[[Record], Any]] = {
+    "time REAL": itemgetter("seconds"), "memory REAL": itemgetter("memory"),
+    "status ENUM": lambda record: EXACT if record["solved"] else CRASH if record["seconds"] is None else TIMEOUT,
+    "solved BOOLEAN": itemgetter("solved"), "correct solution BOOLEAN": itemgetter("replay_ok"),
+    "solution length REAL": itemgetter("path_length"), "graph states INTEGER": itemgetter("nodes"),
+    "transitions INTEGER": itemgetter("transitions"), "collision checks INTEGER": itemgetter("collision_checks"),
+    "path length INTEGER": itemgetter("path_length"), "replay ok BOOLEAN": itemgetter("replay_ok"),
+    "coverage REAL": itemgetter("coverage"), "seed INTEGER": itemgetter("seed"),
+}
+"""The columns of a run: those of OMPL's own benchmark, from the transitions on ours."""
+PROGRESS = {"time REAL": "seconds", "transitions INTEGER": "transitions", "coverage REAL": "coverage"}
+
+
+def write_logs(folder: Path, sweep: Sweep, records: Sequence[Record]) -> list[Path]:
+    """Write a log for each environment into a folder, atomically, and return their paths.
+
+    Args:
+        folder: The folder.
+        sweep: What was compared.
+        records: Those of all runs that were made.
+
+    Source of the grammar: OMPL, "Benchmarking", "The benchmark logfile format".
+
+    Raises:
+        RunFolderError: a file cannot be written.
+    """
+    files = []
+    for number, environment in enumerate(sweep.environments, start=1):
+        chosen = [record for record in records if folder_of(record) == sweep.folder(number)]
+        files.append(folder / f"comparison-{sweep.folder(number)}.log")
+        lines = list(_preamble(sweep, environment.label, chosen))
+        for planner in sweep.planners:
+            lines += _planner(sweep, planner, [record for record in chosen if record["planner"] == planner])
+        write_text(files[-1], "\n".join(lines) + "\n")
+    return files
+
+
+def write_database(path: Path, logs: Sequence[Path]) -> None:
+    """Make the database from benchmark logs with OMPL's own reader, atomically; an older one is replaced.
+
+    Args:
+        path: The database.
+        logs: What `write_logs` returned.
+
+    Raises:
+        RunFolderError: the file cannot be written.
+    """
+    with write_errors(path):
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        os.close(handle)
+        try:
+            with redirect_stdout(io.StringIO()):  # it prints what it does
+                readBenchmarkLog(temporary, [str(log) for log in logs], False)
+                computeViews(temporary, False)
+            os.replace(temporary, path)
+        except sqlite3.OperationalError as error:
+            raise OSError(f"SQLite: {error}") from error
+        finally:
+            Path(temporary).unlink(missing_ok=True)
+
+
+def _preamble(sweep: Sweep, experiment: str, records: Sequence[Record]) -> Iterator[str]:
+    yield f"OMPL version {sweep.versions['ompl']}"
+    yield f"Experiment {experiment}"
+    yield "1 experiment properties"
+    yield f"transition_limit INTEGER = {sweep.max_transitions}"
+    yield f"Running on {platform.node() or 'unknown'}"
+    yield f"Starting at {datetime.now().isoformat(sep=' ', timespec='seconds')}"
+    yield from _block(json.dumps(sweep.config(), default=plain))
+    yield from _block(provenance()["processor"])
+    yield f"{sweep.seeds[0]} is the random seed"
+    yield f"{_data(sweep.max_seconds) or 'nan'} seconds per run"
+    yield f"{_data(sweep.max_memory) or 'nan'} MB per run"
+    yield f"{len(sweep.seeds)} runs per planner"
+    yield f"{sum(record['seconds'] or 0.0 for record in records)} seconds spent to collect the data"
+    yield "1 enum type"
+    yield "|".join(("status", *STATUS))
+    yield f"{len(sweep.planners)} planners"
+
+
+def _planner(sweep: Sweep, planner: str, records: Sequence[Record]) -> Iterator[str]:
+    options = sweep.planners[planner]
+    yield planner
+    yield f"{len(options)} common properties"
+    yield from (f"{name} = {json.dumps(value, default=plain)}" for name, value in options.items())
+    yield f"{len(PROPERTIES)} properties for each run"
+    yield from PROPERTIES
+    yield f"{len(records)} runs"
+    yield from ("".join(f"{_data(measure(record))}; " for measure in PROPERTIES.values()) for record in records)
+    yield f"{len(PROGRESS)} progress properties for each run"
+    yield from PROGRESS
+    yield f"{len(records)} runs"
+    yield from (_series(record["progress"]) for record in records)
+    yield "."
+
+
+def _series(progress: dict[str, list[float]] | None) -> str:
+    """Return the measurements of a run as `time,transitions,coverage,;...;`."""
+    columns = [] if progress is None else [progress[name] for name in PROGRESS.values()]
+    return "".join("".join(f"{_data(value)}," for value in sample) + ";" for sample in zip(*columns, strict=True))
+
+
+def _data(value: Any) -> str:
+    """Return a number as the log has it: nothing where there is none, truth as 1 or 0."""
+    return "" if value is None else str(int(value)) if isinstance(value, bool) else str(value)
+
+
+def _block(text: str) -> Iterator[str]:
+    yield from ("<<<|", text, "|>>>")

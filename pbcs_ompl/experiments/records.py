@@ -1,0 +1,79 @@
+"""The records of an experiment: one file for each run, read when the experiment is resumed."""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import NamedTuple
+
+from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
+from pbcs_ompl.experiments.workers import Executor, Limits
+from pbcs_ompl.results.files import RUNS, read_json, write_json
+
+REMEDY = "remove the file to have this run made again"
+
+
+class Results(NamedTuple):
+    """What the runs of an experiment found, by their names."""
+
+    records: dict[str, Record]
+    failures: dict[str, Failure]
+
+
+def record_file(folder: Path, name: str) -> Path:
+    """Return the file of the record of a run in the folder of its experiment."""
+    return folder / RUNS / f"{name}.json"
+
+
+def read_records(folder: Path, runs: Sequence[Run]) -> dict[str, Record]:
+    """Return the records of the runs that were made, by their names.
+
+    Raises:
+        DamagedFile: a record is damaged. It is never replaced silently: what damaged it may have damaged others.
+    """
+    files = {run.name: record_file(folder, run.name) for run in runs}
+    return {name: _read_record(file) for name, file in files.items() if file.is_file()}
+
+
+def _read_record(file: Path) -> Record:
+    try:
+        record = read_json(file)
+    except DamagedFile as error:
+        raise DamagedFile(f"{error}; {REMEDY}") from error
+    if not isinstance(record, dict):
+        raise DamagedFile(f"{file} is damaged: expected an object, got {type(record).__name__}; {REMEDY}")
+    return record
+
+
+def make_missing_runs(runs: Sequence[Run], function: RunFunction, known: Mapping[str, Record], *, folder: Path | None,
+                      executor: Executor, limits: Limits, on_end: Callable[[Record | Failure], None],
+                      failed_record: Callable[[Run, Failure], Record] | None = None) -> Results:
+    """Make the runs that have no record yet, and write the record of each as soon as it ends.
+
+    Args:
+        runs: All runs of the experiment.
+        function: Makes a run.
+        known: The records of the runs that were made before, by name.
+        folder: Where to write the records; None for nowhere.
+        executor: What executes the runs.
+        limits: What each run may use.
+        on_end: Called with what a run found, when it ends.
+        failed_record: Returns the record that a failed run gets; None if it gets none, and is made again next time.
+
+    Returns:
+        The records in the order of the runs, and the failures.
+    """
+    records, failures = dict(known), {}
+    missing = [run for run in runs if run.name not in records]
+    with closing(executor(missing, function, limits)) as ended:
+        for run, found in ended:
+            if isinstance(found, Failure) and failed_record is not None:
+                found = failed_record(run, found)
+            if isinstance(found, Failure):
+                failures[run.name] = found
+            else:
+                records[run.name] = found
+                if folder is not None:
+                    write_json(record_file(folder, run.name), found)
+            on_end(found)
+    return Results({run.name: records[run.name] for run in runs if run.name in records}, failures)

@@ -1,0 +1,106 @@
+"""The command line in words: what a person may paste into a shell to make a run, to repeat it, and to continue from it.
+
+Each function returns the words after `pbcs`; `command` joins them. The configurations are those of config.toml.
+"""
+
+import json
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.plain import plain
+
+Words = list[str]
+BUDGETS = ("max_transitions", "max_seconds", "max_memory")
+
+
+def command(words: Sequence[str]) -> str:
+    """Return a command line, quoted for a shell."""
+    return shlex.join(["pbcs", *words])
+
+
+def environment_words(spec: EnvSpec) -> Words:
+    """Return the options that name an environment."""
+    return ["--env", spec.id, *_json_words("--env-kwargs", spec.kwargs), *_rule_words(spec)]
+
+
+def plan_words(config: dict[str, Any]) -> Words:
+    """Return the words of a plan."""
+    return ["plan", *_environment(config), *_planner(config), "--seed", str(config["seed"]), *_budgets(config)]
+
+
+def train_words(config: dict[str, Any], trajectory: Path | None = None) -> Words:
+    """Return the words of a training.
+
+    Args:
+        config: Its settings.
+        trajectory: The trajectory that was given to it; None where it was planned.
+    """
+    planning = _planner(config) if trajectory is None else ["--path", str(trajectory)]
+    named = [word for name in ("method", "agent", "preset", "device", "seed")
+             for word in (f"--{name}", str(config[name]))]
+    return ["train", *_environment(config), *planning, *named, *_json_words("--settings", config["settings"]),
+            *_json_words("--agent-settings", config["agent_settings"]), *_budgets(config)]
+
+
+def resume_words(folder: Path, max_transitions: int | None = None) -> Words:
+    """Return the words that resume a training in a folder, with another budget if one is given."""
+    budget = [] if max_transitions is None else ["--max-transitions", str(max_transitions)]
+    return ["train", "--resume", str(folder), *budget]
+
+
+def eval_words(folder: str | Path, *, episodes: int | None = None, epsilon: float | None = None) -> Words:
+    """Return the words of an evaluation of the chain in a folder; what is None is left out."""
+    options = {"--episodes": episodes, "--epsilon": epsilon}
+    return ["eval", str(folder), *(word for name, value in options.items() if value is not None
+                                   for word in (name, str(value)))]
+
+
+def compare_words(config: dict[str, Any]) -> Words:
+    """Return the words of a comparison whose seeds are 0, 1, ..."""
+    options = {name: chosen for name, chosen in config["planner_kwargs"].items() if chosen}
+    specs = [EnvSpec.from_dict(place) for place in config["environments"]]
+    if len(specs) == 1:
+        environments = environment_words(specs[0])
+    else:
+        environments = ["--env", *(spec.id for spec in specs), "--env-kwargs",
+                        *(json.dumps(spec.kwargs, default=plain) for spec in specs), *_rule_words(specs[0])]
+    return ["compare", "--planners", *config["planners"], *_json_words("--planner-kwargs", options), *environments,
+            "--seeds", str(len(config["seeds"])), *_budgets(config)]
+
+
+def study_words(study: str | Path, *, seeds: int | None = None, device: str | None = None) -> Words:
+    """Return the words of a study, named by its id or folder; what is None is left out."""
+    options = {"--seeds": seeds, "--device": device}
+    return ["study", str(study), *(word for name, value in options.items() if value is not None
+                                   for word in (name, str(value)))]
+
+
+def report_words(folder: Path) -> Words:
+    """Return the words that write the report of a folder."""
+    return ["report", str(folder)]
+
+
+def _environment(config: dict[str, Any]) -> Words:
+    return environment_words(EnvSpec.from_dict(config["environment"]))
+
+
+def _planner(config: dict[str, Any]) -> Words:
+    return ["--planner", config["planner"], *_json_words("--planner-kwargs", config["planner_kwargs"])]
+
+
+def _rule_words(spec: EnvSpec) -> Words:
+    rules = {"--goal": spec.goal, "--feature": spec.feature, "--start-seed": spec.start_seed}
+    return [f"{name}={value}" for name, value in rules.items() if value is not None]
+
+
+def _json_words(option: str, values: dict[str, Any]) -> Words:
+    """Return an option whose value is a JSON object; nothing where that is empty."""
+    return [option, json.dumps(values, default=plain)] if values else []
+
+
+def _budgets(config: dict[str, Any]) -> Words:
+    return [word for name in BUDGETS if name in config
+            for word in (f"--{name.replace('_', '-')}", str(config[name]))]

@@ -1,0 +1,92 @@
+"""The claims of the maze table on records whose truth is known."""
+
+from pathlib import Path
+
+import pytest
+
+from pbcs_ompl.experiments.studies.maze_table import analysis
+from pbcs_ompl.experiments.study import find_study
+
+STUDY = find_study("maze-table")
+SIZES = (2, 3, 4, 5, 7, 10, 15)
+
+
+def record(label, size, index, solved, *, cost=100_000, skills=1, stalled=None):
+    return {"label": label, "size": size, "index": index, "seed": 500 + index, "solved": solved, "succeeds": solved,
+            "transitions": cost, "skills": skills, "stalled": stalled, "max_transitions": 1_000_000,
+            "success_rate": float(solved), "nominal_success_rate": float(solved)}
+
+
+def table(pbcs, pb, ddpg, td3, **options):
+    """Records of ten seeds a size; each method is a function of size and index that says whether it is solved."""
+    methods = {"PBCS": pbcs, "PB": pb, "DDPG": ddpg, "TD3": td3}
+    return [record(label, size, index, solves(size, index), skills=size, **options)
+            for label, solves in methods.items() for size in SIZES for index in range(10)]
+
+
+@pytest.fixture
+def verdicts(monkeypatch):
+    """Return the claims on some records by their sentences; nothing is drawn."""
+    monkeypatch.setattr(analysis, "save", lambda figure, path: None)
+    return lambda records: {claim.claim: claim for claim in analysis.analyse(records, Path())}
+
+
+def find(claims, words):
+    (claim,) = [claim for text, claim in claims.items() if words in text]
+    return claim
+
+
+def test_a_world_as_the_thesis_describes_it(verdicts):
+    records = table(lambda size, _: True, lambda size, index: size == 2 and index < 9,
+                    lambda size, index: size == 2 and index < 1, lambda size, index: size == 2 and index < 1)
+    claims = verdicts(records)
+    assert len(claims) == 13
+    assert {text: claim.agrees for text, claim in claims.items()} == dict.fromkeys(claims, True)
+    compared = find(claims, "PBCS solves more mazes than PB (").numbers
+    assert compared["only PBCS, only PB"] == [61, 0]
+
+
+def test_the_opposite_world(verdicts):
+    records = table(lambda size, index: size < 4 and index < 9, lambda size, _: True, lambda size, _: size > 2,
+                    lambda size, _: size > 2)
+    claims = verdicts(records)
+    unlike = {"PB solves 2x2 mazes much more often", "PBCS chains more skills"}
+    for text, claim in claims.items():
+        assert claim.agrees is any(text.startswith(words) for words in unlike), text
+
+
+def test_a_chain_that_took_more_than_the_others_had_is_not_held_against_them(verdicts):
+    claims = verdicts(table(lambda *_: True, lambda *_: False, lambda *_: False, lambda *_: False, cost=1_000_001))
+    for label in ("PB", "DDPG", "TD3"):
+        claim = find(claims, f"PBCS solves more mazes than {label} (")
+        assert claim.agrees is False
+        assert claim.numbers["PBCS"]["successes"] == 0
+    assert find(claims, "95% of the mazes").agrees is True
+
+
+def test_four_runs_without_success_do_not_show_that_there_is_none(verdicts):
+    records = [record(label, 2, index, False) for label in ("PBCS", "PB", "DDPG", "TD3") for index in range(4)]
+    claims = verdicts(records)
+    assert {text for text, claim in claims.items() if claim.agrees is not None} == {
+        text for text in claims if "95% of the mazes" in text}
+    assert find(verdicts([*records, record("TD3", 2, 4, True)]), "TD3 alone solves some").agrees is True
+
+
+def test_pbcs_runs_first_and_then_the_others_in_balance():
+    settings = STUDY.runs(STUDY.sweep, 20)
+    labels = [one["label"] for one in settings]
+    assert len(settings) == 100 + 20 + 7 * (10 + 10 + 3)
+    assert set(labels[:120]) == {"PBCS"}
+    assert [(one["label"], one["size"]) for one in settings[120:141]] == [
+        (label, size) for size in SIZES for label in ("PB", "DDPG", "TD3")]
+    assert {one["seed"] for one in settings[120:141]} == {500}
+
+
+@pytest.mark.parametrize("label", ["PBCS", "TD3"])
+def test_the_first_seed_is_drawn(label, tmp_path):
+    pictured = record(label, 2, 0, True) | {
+        "env_kwargs": {"size": 2}, "plan": None if label == "TD3" else [[0.5, 0.5], [1.5, 1.0], [0.5, 1.5]],
+        "rollout": [[0.5, 0.5], [1.5, 1.0], [0.5, 1.5]], "activations": [[[0.5, 0.5], 0.1]]}
+    STUDY.analyse([pictured], tmp_path)
+    assert (tmp_path / "mazes.png").stat().st_size > 5000
+    assert (tmp_path / "chain-2x2.png").is_file() == (label == "PBCS")
