@@ -5,14 +5,14 @@ import shutil
 from html.parser import HTMLParser
 
 import pytest
-from pbcs_ompl.results.report.content import MOST_RUNS
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.core.formatting import in_words, seeds_in_words
 from pbcs_ompl.experiments.claims import rate
-from pbcs_ompl.results.files import write_json, write_text
+from pbcs_ompl.results.files import write_json, write_toml
 from pbcs_ompl.results.report import write_report
+from pbcs_ompl.results.report.contents import MOST_RUNS
 
 REFERENCES = {"src", "href", "srcset", "data", "action", "poster", "background"}
 
@@ -46,15 +46,15 @@ def test_the_verb_reports_every_folder(copy, capsys):
     assert answer["out"] == "runs/report.html"
     outcomes = {one["folder"]: (one["kind"], one["outcome"]) for one in answer["folders"]}
     assert {name: kind for name, (kind, _) in outcomes.items()} == {
-        "comparison": "comparison", "evaluation": "evaluation", "given": "training", "plan": "plan",
-        "study": "study", "training": "training"}
+        "comparison": "compare", "evaluation": "eval", "given": "train", "plan": "plan",
+        "study": "study", "training": "train"}
     assert outcomes["comparison"][1] == "4 of 8 runs solved"
     assert outcomes["study"][1] == "1 of 3 claims true, 1 false, 1 undecided"
     assert outcomes["given"][1] == "not solved"
     page = Page(copy / "runs/report.html")
     for said in ("1 < 0 & <b>bold</b>", "1/3 = 33.3% (95 % interval 6.1% to 79.2%)",
                  "ZeroDivisionError: division by zero", "cannot build SST", "the budget of 1200 transitions is used up",
-                 '"control_duration" = 2', "Study coin-toss", "numpy", "torch", "logical cores"):
+                 'control_duration = 2', "Study coin-toss", "numpy", "torch", "logical cores"):
         assert said in page.text, said
     assert page.tags.count("img") == len(list(copy.rglob("*.png")))
 
@@ -76,7 +76,7 @@ def test_whatever_a_folder_says_stays_text(copy):
     write_json(copy / "runs/study/result.json", result | {"agrees": [claim], "failed": {evil: evil}})
     write_json(copy / "runs/study/provenance.json", [{evil: evil}])
     write_json(copy / "runs/study/runs/coin-0.json", {evil: evil, "seed": 0})
-    write_text(copy / "runs/study/config.toml", f"study = {json.dumps(evil)}\nsides = 2\n")
+    write_toml(copy / "runs/study/config.toml", {"kind": "study", "study": evil, "sides": 2})
     (copy / "runs/study/figures/coins.png").rename(copy / "runs/study/figures/\"><script>.png")
     path, _ = write_report("runs/study")
     page = Page(path)
@@ -102,13 +102,13 @@ def test_what_has_not_ended_is_shown_as_such(copy):
     _, sections = write_report("runs")
     outcomes = {section.name: section.content.outcome for section in sections}
     assert outcomes["comparison"] == "3 of 7 runs solved; 7 of 8 runs made"
-    assert outcomes["study"] == "has not ended; 3 runs made"
-    assert {outcomes[name] for name in ("plan", "training", "evaluation")} == {"has not ended"}
+    assert outcomes["study"] == "not finished; 3 runs made"
+    assert {outcomes[name] for name in ("plan", "training", "evaluation")} == {"not finished"}
 
 
 @pytest.mark.parametrize(("file", "content", "named"), [
     ("plan/config.toml", b"env = ", "plan/config.toml is damaged"),
-    ("plan/config.toml", b"colour = 3", "plan/config.toml is not that of a run"),
+    ("plan/config.toml", b"colour = 3", "plan/config.toml has the kind None; expected plan or train or eval"),
     ("plan/result.json", b"{", "plan/result.json is damaged"),
     ("plan/result.json", b"[]", "plan/result.json is not a result"),
     ("plan/result.json", b"{}", "plan is not the folder of a plan as this version writes it: KeyError('transitions')"),

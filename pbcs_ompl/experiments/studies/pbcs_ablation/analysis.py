@@ -37,8 +37,9 @@ def _usual(records: Records, parameter: str) -> float:
 
 def _ends(records: Records, parameter: str) -> tuple[float, float, float]:
     """Return the lowest, the usual and the highest value."""
-    values = [*_swept(records, parameter)]
-    return values[0], _usual(records, parameter), values[-1]
+    usual = _usual(records, parameter)
+    values = list(_swept(records, parameter)) or [usual]
+    return values[0], usual, values[-1]
 
 
 def _solved(runs: Records) -> dict[str, Any]:
