@@ -11,23 +11,25 @@ import time
 from pathlib import Path
 
 from pbcs_ompl.bridge.coverage import log_spaced
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.experiments.compare import read_comparison
 from pbcs_ompl.experiments.planner_arena import write_database, write_logs
-from pbcs_ompl.experiments.planning_run import Job, broken
+from pbcs_ompl.experiments.planning_run import failed_record
 from pbcs_ompl.experiments.records import record_file
+from pbcs_ompl.experiments.run import Failure, Record, Run
 from pbcs_ompl.experiments.sweep import Sweep, make_sweep
-from pbcs_ompl.results.files import CONFIG, to_toml, write_text
+from pbcs_ompl.results.files import CONFIG, write_toml
 from pbcs_ompl.results.report import write_report
 
 PLANNERS, SIZES, SEEDS = ("Ex", "RRTNH", "EST", "KPIECE1"), range(2, 12), 250
 LIMIT_SECONDS, LIMIT_MEGABYTES = 20.0, 500.0
 
 
-def record(job: Job, rng: random.Random) -> dict:
+def record(run: Run, rng: random.Random) -> Record:
     """Return what a run could have recorded, with a curve of some 55 points; one run in ten is not solved."""
     transitions = rng.randint(10_000, 1_000_000)
     points = log_spaced(transitions).tolist()
-    return {**broken(job, "made up"), "solved": rng.random() < 0.9, "transitions": transitions, "seconds": rng.random(),
+    return {**failed_record(run, Failure("made up")), "solved": rng.random() < 0.9, "transitions": transitions, "seconds": rng.random(),
             "collision_checks": transitions + 1, "nodes": transitions, "path_length": 300, "replay_ok": True,
             "memory": 250.0, "coverage": rng.random(),
             "progress": {"transitions": points, "seconds": sorted(rng.random() for _ in points),
@@ -36,13 +38,13 @@ def record(job: Job, rng: random.Random) -> dict:
 
 def write_records(folder: Path, sweep: Sweep) -> int:
     """Write a record for every run of the sweep; return how many."""
-    rng, jobs = random.Random(0), list(sweep.jobs())
-    for job in jobs:
-        file = record_file(folder, job.name)
+    rng, runs = random.Random(0), list(sweep.runs())
+    for run in runs:
+        file = record_file(folder, run.name)
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(record(job, rng), indent=2))
-    write_text(folder / CONFIG, to_toml(sweep.config()))
-    return len(jobs)
+        file.write_text(json.dumps(record(run, rng), indent=2))
+    write_toml(folder / CONFIG, sweep.config())
+    return len(runs)
 
 
 def peak_megabytes() -> float:
@@ -51,7 +53,7 @@ def peak_megabytes() -> float:
 
 def main() -> None:
     """Write the records, merge them, print what it took."""
-    sweep = make_sweep(PLANNERS, "pbcs/Maze-v0", [{"size": size} for size in SIZES], SEEDS, 1_000_000, None, None)
+    sweep = make_sweep(PLANNERS, [EnvSpec("pbcs/Maze-v0", {"size": size}) for size in SIZES], SEEDS, 1_000_000, None, None)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         count = write_records(folder, sweep)
@@ -61,7 +63,7 @@ def main() -> None:
         write_database(folder / "comparison.db", write_logs(folder, sweep, found.runs))
         written = time.perf_counter()
         del found  # pbcs report is a process of its own
-        page, _ = write_report(folder)
+        page = write_report(folder).page
         ended, size = time.perf_counter(), page.stat().st_size / 1e6
     seconds, megabytes = ended - began, peak_megabytes()
     print(f"{count} records: listed, read and merged in {merged - began:.1f} s, logs and database in "
