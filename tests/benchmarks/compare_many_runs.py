@@ -29,8 +29,8 @@ def record(run: Run, rng: random.Random) -> Record:
     """Return what a run could have recorded, with a curve of some 55 points; one run in ten is not solved."""
     transitions = rng.randint(10_000, 1_000_000)
     points = log_spaced(transitions).tolist()
-    return {**failed_record(run, Failure("made up")), "solved": rng.random() < 0.9, "transitions": transitions, "seconds": rng.random(),
-            "collision_checks": transitions + 1, "nodes": transitions, "path_length": 300, "replay_ok": True,
+    return {**failed_record(run, Failure("made up")), "solved": rng.random() < 0.9, "transitions": transitions,
+            "seconds": rng.random(), "collision_checks": transitions + 1, "nodes": transitions, "path_length": 300, "replay_ok": True,
             "memory": 250.0, "coverage": rng.random(),
             "progress": {"transitions": points, "seconds": sorted(rng.random() for _ in points),
                          "coverage": sorted(rng.random() for _ in points)}}
@@ -53,7 +53,8 @@ def peak_megabytes() -> float:
 
 def main() -> None:
     """Write the records, merge them, print what it took."""
-    sweep = make_sweep(PLANNERS, [EnvSpec("pbcs/Maze-v0", {"size": size}) for size in SIZES], SEEDS, 1_000_000, None, None)
+    environments = [EnvSpec("pbcs/Maze-v0", {"size": size}) for size in SIZES]
+    sweep = make_sweep(PLANNERS, environments, SEEDS, 1_000_000, None, None)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         count = write_records(folder, sweep)
