@@ -30,7 +30,8 @@ def record(run: Run, rng: random.Random) -> Record:
     transitions = rng.randint(10_000, 1_000_000)
     points = log_spaced(transitions).tolist()
     return {**failed_record(run, Failure("made up")), "solved": rng.random() < 0.9, "transitions": transitions,
-            "seconds": rng.random(), "collision_checks": transitions + 1, "nodes": transitions, "path_length": 300, "replay_ok": True,
+            "seconds": rng.random(), "collision_checks": transitions + 1, "nodes": transitions, "path_length": 300,
+            "replay_ok": True,
             "memory": 250.0, "coverage": rng.random(),
             "progress": {"transitions": points, "seconds": sorted(rng.random() for _ in points),
                          "coverage": sorted(rng.random() for _ in points)}}

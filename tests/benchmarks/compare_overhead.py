@@ -4,8 +4,8 @@
 
 The runs last at least 0.5 s each: EST in a large maze, stopped by its budget. Their own time is that of the same calls
 of `plan`, one after the other in this process. The rest of a comparison's wall time is overhead: coverage, records,
-messages to the parent, the database; and once the start of the process, its imports and compilers, which is shown apart.
-So is the time beside the search alone, most of which `plan` takes to read the tree out of OMPL. All this needs two cores
+messages to the parent, the database; and once the start of the process, its imports and compilers, shown apart. So is
+the time beside the search alone, most of which `plan` takes to read the tree out of OMPL. All this needs two cores
 that nothing else uses; the overhead in CPU time, of all processes, less what a comparison of one run takes, does not.
 """
 

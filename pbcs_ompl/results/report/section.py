@@ -3,7 +3,8 @@
 import base64
 from dataclasses import dataclass
 from pathlib import Path
-from struct import Struct
+
+from PIL import Image
 
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.results.files import CONFIG, FIGURES
@@ -11,9 +12,6 @@ from pbcs_ompl.results.folder import read_folder
 from pbcs_ompl.results.report.contents import Content, Table, read_content
 from pbcs_ompl.results.report.repeat import repeating, resuming
 
-PNG = b"\x89PNG\r\n\x1a\n"
-HEAD = Struct(">8s8xII")
-"""The first bytes of a PNG: its signature, the length and name of its first chunk, the width and the height."""
 DAMAGED = "damaged"
 
 
@@ -37,11 +35,11 @@ def read_figure(path: Path) -> Figure:
     Raises:
         DamagedFile: it is no PNG.
     """
-    with open(path, "rb") as file:
-        head = file.read(HEAD.size)
-    if len(head) < HEAD.size or HEAD.unpack(head)[0] != PNG:
-        raise DamagedFile(f"{path} is damaged: not a PNG")
-    return Figure(path, *HEAD.unpack(head)[1:])
+    try:
+        with Image.open(path, formats=["PNG"]) as image:
+            return Figure(path, *image.size)
+    except OSError as error:
+        raise DamagedFile(f"{path} is damaged: not a PNG") from error
 
 
 @dataclass(frozen=True)
