@@ -1,4 +1,4 @@
-"""What the README and the docs tell people to type works as it stands there."""
+"""What the README and the docs show works as it stands there."""
 
 import re
 import shlex
