@@ -5,7 +5,8 @@
     plan = pbcs_ompl.plan("pbcs/Maze-v0", env_kwargs={"size": 5, "maze_seed": 1}, seed=0)
     print(plan.summary())
 
-Names are imported when they are first used, so that `import pbcs_ompl` costs nothing.
+The verbs take an environment as an id, a Gymnasium environment, an `EnvSpec` or a resettable model, and return a
+result. Names are imported when they are first used, so that `import pbcs_ompl` costs nothing.
 """
 
 from importlib import import_module
@@ -14,22 +15,46 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pbcs_ompl.bridge.plan import PlanResult, plan
     from pbcs_ompl.bridge.trajectory import Trajectory
-    from pbcs_ompl.resettable import adapt, check_resettable, make
-    from pbcs_ompl.skills import train
-    from pbcs_ompl.skills.chain import SkillChain
-    from pbcs_ompl.skills.evaluation import evaluate
+    from pbcs_ompl.core.env_spec import EnvSpec
+    from pbcs_ompl.experiments.compare import Comparison, compare
+    from pbcs_ompl.experiments.run_study import StudyResult, run_study
+    from pbcs_ompl.resettable import ResetReport, check_resettable, make
+    from pbcs_ompl.results.report import Report, write_report
+    from pbcs_ompl.skills import Evaluation, SkillChain, TrainResult, evaluate, resume, train
 
-__all__ = ["PlanResult", "SkillChain", "Trajectory", "adapt", "check_resettable", "evaluate", "make", "plan",
-           "train"]
+__all__ = [
+    "Comparison",
+    "EnvSpec",
+    "Evaluation",
+    "PlanResult",
+    "Report",
+    "ResetReport",
+    "SkillChain",
+    "StudyResult",
+    "TrainResult",
+    "Trajectory",
+    "check_resettable",
+    "compare",
+    "evaluate",
+    "make",
+    "plan",
+    "resume",
+    "run_study",
+    "train",
+    "write_report",
+]
 
-_HOMES = {
-    "plan": "pbcs_ompl.bridge.plan", "PlanResult": "pbcs_ompl.bridge.plan",
-    "Trajectory": "pbcs_ompl.bridge.trajectory",
-    "make": "pbcs_ompl.resettable", "adapt": "pbcs_ompl.resettable",
-    "check_resettable": "pbcs_ompl.resettable",
-    "train": "pbcs_ompl.skills", "SkillChain": "pbcs_ompl.skills.chain",
-    "evaluate": "pbcs_ompl.skills.evaluation",
+_MODULES = {
+    "bridge.plan": ("PlanResult", "plan"),
+    "bridge.trajectory": ("Trajectory",),
+    "core.env_spec": ("EnvSpec",),
+    "experiments.compare": ("Comparison", "compare"),
+    "experiments.run_study": ("StudyResult", "run_study"),
+    "resettable": ("ResetReport", "check_resettable", "make"),
+    "results.report": ("Report", "write_report"),
+    "skills": ("Evaluation", "SkillChain", "TrainResult", "evaluate", "resume", "train"),
 }
+_HOMES = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
@@ -39,7 +64,7 @@ def __getattr__(name: str) -> Any:
         return version("pbcs-ompl")
     if name not in _HOMES:
         raise AttributeError(f"module 'pbcs_ompl' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(f"pbcs_ompl.{_HOMES[name]}"), name)
 
 
 def __dir__() -> list[str]:

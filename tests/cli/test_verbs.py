@@ -198,7 +198,7 @@ class Broken(Strategy):
 
 
 @pytest.mark.parametrize(("error", "status", "expected"), [
-    ("ValueError('oops')", 2, "pbcs: error: Broken met an exception in the environment, goal or strategy: "),
+    ("ValueError('oops')", 2, "pbcs: error: Broken: the environment, goal or strategy raised ValueError: oops"),
     ("KeyboardInterrupt", 130, "pbcs: interrupted; run the same command again to start over"),
 ])
 def test_a_users_exception_is_one_line_even_at_exit(tmp_path, error, status, expected):
