@@ -6,6 +6,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
+from pbcs_ompl.core.batches import check_batch
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
 from pbcs_ompl.core.types import Array, BoolArray, Transition
 
@@ -66,8 +67,8 @@ class LineEnv(gymnasium.Env[Array, Array]):
             InvalidState: states of another shape, or not finite.
             InvalidOption: controls of another shape, or not finite.
         """
-        states = _as_batch("states", states, InvalidState)
-        controls = _as_batch("controls", controls, InvalidOption)
+        states = check_batch("states", states, 1, InvalidState)
+        controls = check_batch("controls", controls, 1, InvalidOption)
         if len(states) != len(controls):
             raise InvalidOption(f"got {len(controls)} controls for {len(states)} states")
         after = np.clip(states + np.clip(controls, -MAX_STEP, MAX_STEP), self.state_low, HIGH)
@@ -84,7 +85,7 @@ class LineEnv(gymnasium.Env[Array, Array]):
         Raises:
             InvalidState: the state is outside, or not finite.
         """
-        checked = _as_batch("state", np.reshape(state, (1, -1)), InvalidState)
+        checked = check_batch("state", np.reshape(state, (1, -1)), 1, InvalidState)
         if not self.is_valid(checked)[0]:
             raise InvalidState(f"state={checked[0].tolist()} is outside of [{self.state_low[0]:g}, {HIGH:g}]")
         self._state = checked[0].copy()
@@ -106,13 +107,3 @@ class LineEnv(gymnasium.Env[Array, Array]):
     def advance_towards(self, states: Array, targets: Array) -> Array:
         """Return the controls [B, 1] from states [B, 1] straight to targets [B, 1], clipped to the box."""
         return np.clip(np.asarray(targets) - states, -MAX_STEP, MAX_STEP)
-
-
-def _as_batch(name: str, values: Array, error: type[InvalidState] | type[InvalidOption]) -> Array:
-    array = np.ascontiguousarray(values, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != 1:
-        raise error(f"{name}: expected an array of shape [B, 1], got {list(array.shape)}")
-    if not np.isfinite(array).all():
-        row = int(np.flatnonzero(~np.isfinite(array))[0])
-        raise error(f"{name}: row {row} is not finite: {array[row].tolist()}")
-    return array

@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
+from pbcs_ompl.core.batches import check_batch
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
 from pbcs_ompl.core.rendering import check_can_render, prefer_headless_rendering
 from pbcs_ompl.core.types import Array, BoolArray, Transition
@@ -124,7 +125,7 @@ class BatchedMujocoEnv(gymnasium.Env[Array, Array], ABC):
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Make one step; `info` has `is_success` = `success` and `distance_to_goal`."""
         before = self.get_env_state()[None]
-        after = self._advance(before, _as_batch("action", np.reshape(action, (1, -1)), self.model.nu, InvalidOption))
+        after = self._advance(before, check_batch("action", np.reshape(action, (1, -1)), self.model.nu, InvalidOption))
         rewards, terminated, success = self.outcome(before, after)
         info = self._info(after, success=bool(success[0]))
         return self.observe(after)[0], float(rewards[0]), bool(terminated[0]), False, info
@@ -136,8 +137,8 @@ class BatchedMujocoEnv(gymnasium.Env[Array, Array], ABC):
             InvalidState: states of another shape, or not finite.
             InvalidOption: controls of another shape, or not finite.
         """
-        states = _as_batch("states", states, len(self.state_low), InvalidState)
-        controls = _as_batch("controls", controls, self.model.nu, InvalidOption)
+        states = check_batch("states", states, len(self.state_low), InvalidState)
+        controls = check_batch("controls", controls, self.model.nu, InvalidOption)
         if len(states) != len(controls):
             raise InvalidOption(f"got {len(controls)} controls for {len(states)} states")
         if len(states) < SMALL_BATCH or self._threads < 2:
@@ -158,7 +159,7 @@ class BatchedMujocoEnv(gymnasium.Env[Array, Array], ABC):
         Raises:
             InvalidState: it is of another size, or not finite.
         """
-        vector = _as_batch("state", np.reshape(state, (1, -1)), len(self.state_low), InvalidState)
+        vector = check_batch("state", np.reshape(state, (1, -1)), len(self.state_low), InvalidState)
         mujoco.mj_setState(self.model, self.data, vector[0], PHYSICS)
 
     def render(self) -> Any:
@@ -214,12 +215,3 @@ class BatchedMujocoEnv(gymnasium.Env[Array, Array], ABC):
 
     def _info(self, state: Array, *, success: bool) -> dict[str, Any]:
         return {"is_success": success, "success": success, "distance_to_goal": float(self.goal_distance(state)[0])}
-
-
-def _as_batch(name: str, values: Any, size: int, error: type[InvalidState] | type[InvalidOption]) -> Array:
-    array = np.ascontiguousarray(values, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != size:
-        raise error(f"{name}: expected {size} numbers a row, got an array of shape {list(array.shape)}")
-    if not np.isfinite(array).all():
-        raise error(f"{name}: not finite: {array[~np.isfinite(array).all(axis=1)][0].tolist()}")
-    return array

@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
+from pbcs_ompl.core.batches import check_batch
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray, Transition
 from pbcs_ompl.envs import point_kernels
@@ -117,7 +118,7 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Move by `action` [2]; `info` has `is_success` = `success`, `hit_wall`, `distance_to_goal`."""
-        controls = _as_batch("action", np.reshape(action, (1, -1)), InvalidOption)
+        controls = check_batch("action", np.reshape(action, (1, -1)), 2, InvalidOption)
         after, hits = self.move(self._state[None], controls)
         rewards, terminated, _ = point_kernels.finish(self.settings, after, hits)
         self._state = after[0]
@@ -131,8 +132,8 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
             InvalidState: states of another shape, or not finite.
             InvalidOption: controls of another shape, or not finite.
         """
-        states = _as_batch("states", states, InvalidState)
-        controls = _as_batch("controls", controls, InvalidOption)
+        states = check_batch("states", states, 2, InvalidState)
+        controls = check_batch("controls", controls, 2, InvalidOption)
         if len(states) != len(controls):
             raise InvalidOption(f"got {len(controls)} controls for {len(states)} states")
         after, hits = self.move(states, controls)
@@ -193,13 +194,3 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         return state
 
     where_invalid = "inside a wall"
-
-
-def _as_batch(name: str, values: Array, error: type[InvalidState] | type[InvalidOption]) -> Array:
-    array = np.ascontiguousarray(values, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise error(f"{name}: expected an array of shape [B, 2], got {list(array.shape)}")
-    if not np.isfinite(array).all():
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise error(f"{name}: row {row} is not finite: {array[row].tolist()}")
-    return array

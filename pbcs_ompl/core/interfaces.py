@@ -19,6 +19,7 @@ class ResettableModel(Protocol):
     One adapter for each family of environments lies in `pbcs_ompl.resettable`.
 
     Attributes:
+        env: The environment that is stepped; None where there is none.
         spec: What makes the same model again, in another process too.
         capabilities: "visited" states can be restored; "arbitrary" vectors within the bounds too; "exact" means
             that a restored state continues bit for bit.
@@ -35,6 +36,7 @@ class ResettableModel(Protocol):
         goal_circle: Centre and radius (x, y, r) of the goal in the same plane, for pictures; None when unknown.
     """
 
+    env: Any
     spec: EnvSpec
     capabilities: frozenset[Capability]
     state_low: Array
@@ -106,11 +108,21 @@ class ResettableModel(Protocol):
 
 
 @runtime_checkable
-class VectorisedEnv(Protocol):
-    """What an environment offers to be reset anywhere in the fastest way (beside being a `gymnasium.Env`).
+class GetSetEnv(Protocol):
+    """What an environment offers to be resettable in the simplest way (beside being a `gymnasium.Env`).
 
-    Optional attributes, each with a default: `feature_dims` (all), `bin_size` (extent / 20), `advance_towards`
-    (none), `step_one` (through `transition`), `parallel_batch` (1), `walls` (none), `goal_circle` (none).
+    Optional attributes: those of `resettable.attributes.EnvAttributes`.
+    """
+
+    def get_env_state(self) -> Array: ...
+    def set_env_state(self, state: Array) -> None: ...
+
+
+@runtime_checkable
+class VectorisedEnv(Protocol):
+    """What an environment offers to be resettable in the fastest way (beside being a `gymnasium.Env`).
+
+    Optional attributes: those of `resettable.attributes.EnvAttributes`.
     """
 
     state_low: Array

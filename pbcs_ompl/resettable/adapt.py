@@ -1,18 +1,22 @@
 """Choose the adapter for an environment."""
 
 import warnings
+from dataclasses import replace
 from typing import Any, cast
 
 import gymnasium
 
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, NotResettable
-from pbcs_ompl.core.interfaces import ResettableModel, VectorisedEnv
-from pbcs_ompl.resettable.adapters.classic import AttributeEnv, VectorEnv, keeps_state
-from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel, offers_get_set_state
-from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, MujocoModel, check_observes, shows_mujoco
+from pbcs_ompl.core.interfaces import GetSetEnv, ResettableModel, VectorisedEnv
+from pbcs_ompl.resettable.adapters.classic import AttributeEnv, VectorEnv, has_state_attribute
+from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel
+from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, MujocoModel, check_observes, is_mujoco_env
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
 from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, check_replays, copies_are_faithful
+from pbcs_ompl.resettable.attributes import EnvAttributes, misspelt
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.resettable.spaces import check_actions, check_flattenable, check_observations
 from pbcs_ompl.resettable.wrappers import unwrap
@@ -28,7 +32,7 @@ def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | Featur
     """Return `env` as a `ResettableModel`; a model that is already adapted is returned as it is.
 
     The first that fits: its own `VectorisedEnv` protocol, its own `get_env_state` and `set_env_state`, MuJoCo,
-    classic control, deep copies if they prove faithful, and replayed actions, of whose slowness a warning tells.
+    classic control, deep copies if they prove faithful, and replayed actions, with a warning that this is slow.
     The model works on `env.unwrapped` and moves it about: give it an environment of its own.
 
     Args:
@@ -48,23 +52,41 @@ def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | Featur
     inner = unwrap(env)
     if isinstance(inner, RestorableEnv):
         return _model_of(inner)
+    if isinstance(inner, SuccessFlagEnv):
+        return _as_model(GetSetStateModel(inner))
     check_actions(inner)
+    _warn_of_misspelt(inner)
     ruled = goal is not None or feature is not None
     if isinstance(inner, VectorisedEnv) and not ruled:
         check_observations(inner)
-        return VectorisedModel(inner)
-    if offers_get_set_state(inner) and not (shows_mujoco(inner) and not _is_vector(inner)):
+        return _as_model(VectorisedModel(inner))
+    if isinstance(inner, GetSetEnv) and not (is_mujoco_env(inner) and not _is_vector(inner)):
         check_observations(inner)
-        return GetSetStateModel(VectorEnv(inner, goal, feature) if ruled else inner)
+        return _model_of(VectorEnv(inner, goal, feature)) if ruled else _get_set(inner)
     check_flattenable(inner)
     return _model_of(_restorable(inner, goal, feature))
 
 
+def _get_set(inner: Any) -> ResettableModel:
+    offers = EnvAttributes.of(inner)
+    if offers.goal_distance is not None:
+        return _as_model(GetSetStateModel(inner))
+    model = GetSetStateModel(SuccessFlagEnv(inner, offers))
+    if inner.spec is None:
+        model.spec = EnvSpec(type(inner).__qualname__)
+    return _as_model(model)
+
+
+def _warn_of_misspelt(env: Any) -> None:
+    for name, meant in misspelt(env).items():
+        warnings.warn(f"{_name(env)} has {name!r}, which is not read; did you mean {meant!r}?", stacklevel=4)
+
+
 def _restorable(inner: Any, goal: Any, feature: Any) -> RestorableEnv:
-    if shows_mujoco(inner):
+    if is_mujoco_env(inner):
         check_observes(inner)
         return MujocoEnv(inner, goal, feature)
-    if keeps_state(inner):
+    if has_state_attribute(inner):
         return AttributeEnv(inner, goal, feature)
     check_replays(inner)
     if copies_are_faithful(inner):
@@ -74,11 +96,13 @@ def _restorable(inner: Any, goal: Any, feature: Any) -> RestorableEnv:
 
 
 def _model_of(env: RestorableEnv) -> ResettableModel:
-    return MujocoModel(env) if isinstance(env, MujocoEnv) else GetSetStateModel(env)
+    model: GetSetStateModel = MujocoModel(env) if isinstance(env, MujocoEnv) else GetSetStateModel(env)
+    model.spec = replace(model.spec, goal=env.goal_rule, feature=env.feature_rule)
+    return _as_model(model)
 
 
 def _is_vector(env: Any) -> bool:
-    """Tell whether `get_env_state` returns numbers; Adroit's returns a dictionary, and lacks the warm start."""
+    """Return whether `get_env_state` returns numbers; Adroit's returns a dictionary, and lacks the warm start."""
     env.reset(seed=0)
     return not isinstance(env.get_env_state(), dict)
 

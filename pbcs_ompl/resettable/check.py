@@ -1,4 +1,4 @@
-"""Does an environment keep what reset-anywhere promises? A companion of Gymnasium's `check_env`."""
+"""Is an environment resettable? A companion of Gymnasium's `check_env`."""
 
 from collections.abc import Callable
 from copy import deepcopy
@@ -8,10 +8,16 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.errors import InvalidOption, MissingDependency, PbcsError, UnknownName
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapt import adapt
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
+from pbcs_ompl.resettable.attributes import misspelt
+from pbcs_ompl.resettable.make import make
+from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 
 STEPS = 30
 
@@ -41,7 +47,7 @@ class ResetReport:
         return all(check.ok for check in self.checks)
 
     def __str__(self) -> str:
-        verdict = "can be reset anywhere" if self.ok else "cannot be trusted to be reset anywhere"
+        verdict = "is resettable" if self.ok else "is not resettable"
         return "\n".join([f"{self.env_id}: {verdict}", *map(str, self.checks)])
 
 
@@ -66,28 +72,41 @@ class _Roll:
         return ""
 
 
-def check_resettable(env: Any, *, seed: int = 0) -> ResetReport:
-    """Check that `env` continues from a restored state as it did before, bit for bit.
+def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
+                     env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
+                     feature: str | FeatureRule | None = None, start_seed: int | None = None,
+                     seed: int = 0) -> ResetReport:
+    """Check that an environment continues from a restored state as it did before, bit for bit.
+
+    What is wrong with an environment is in the report; what is wrong with the arguments is raised.
 
     Args:
-        env: A Gymnasium environment, or its adapted model. It is moved about.
+        env, env_kwargs, goal, feature, start_seed: See `pbcs_ompl.make`. An environment that is given is moved about.
         seed: Seed of the actions and states that are tried.
+
+    Raises:
+        UnknownName, InvalidOption, MissingDependency: see `pbcs_ompl.make`.
     """
+    name = env if isinstance(env, str) else type(env).__name__
     try:
-        model: Any = adapt(env)
-    except PbcsError as error:
-        return ResetReport(type(env).__name__, (Check("has an adapter", False, str(error)),))
+        model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
+    except (UnknownName, InvalidOption, MissingDependency):
+        raise
     except Exception as error:  # an author's mistake is a finding, not a crash
-        return ResetReport(type(env).__name__, (Check("has an adapter", False, _describe(error)),))
+        if not isinstance(env, str | EnvSpec | gymnasium.Env):
+            raise
+        found = str(error) if isinstance(error, PbcsError) else _describe(error)
+        return ResetReport(name, (Check("has an adapter", False, found),))
     try:
         trial = _Trial(model, seed)
     except Exception as error:  # as above
         return ResetReport(model.spec.id, (Check("can be stepped", False, _describe(error)),))
     tests = [
         ("a restored state continues as before", trial.restored),
-        ("so it does after other steps and another reset", trial.disturbed),
-        ("so it does in a second instance", trial.elsewhere),
+        ("the same after other steps and another reset", trial.disturbed),
+        ("the same in a second instance", trial.elsewhere),
         ("returned arrays are copies", trial.copies),
+        ("optional attributes have the names that are read", trial.spelling),
         ("transition equals step", trial.transition_is_step),
         ("a batch equals a loop", trial.batch_is_loop),
         ("step_one equals transition", trial.step_one_is_transition),
@@ -119,6 +138,8 @@ class _Trial:
         self.start = model.initial_state(seed)
         self.controls = rng.uniform(model.action_low, model.action_high, (STEPS, len(model.action_low)))
         self.candidates = rng.uniform(model.state_low, model.state_high, (STEPS, len(model.state_low)))
+        if isinstance(model.env, SuccessFlagEnv):
+            self.candidates[:, -1] = 0.0
         self.first = self.roll(self.env, self.start)
 
     def roll(self, env: Any, state: Array) -> _Roll:
@@ -153,20 +174,19 @@ class _Trial:
 
     def _second(self) -> Any:
         fresh: Any = gymnasium.make(self.env.spec).unwrapped
-        if not isinstance(self.env, RestorableEnv):
-            return fresh
-        again: Any = adapt(fresh, goal=self.env.goal_rule, feature=self.env.feature_rule)
-        return again.env
+        spec = self.model.spec
+        return adapt(fresh, goal=spec.goal, feature=spec.feature).env
+
+    def spelling(self) -> str:
+        return "; ".join(f"{name!r} is not read; did you mean {meant!r}?"
+                         for name, meant in misspelt(_inner(self.env)).items())
 
     def copies(self) -> str:
-        self.env.set_env_state(state := self.start.copy())
-        state += 1.0
-        if not np.array_equal(self.env.get_env_state(), self.start):
-            return "set_env_state keeps the array it is given"
-        taken = self.env.get_env_state()
-        taken += 1.0
-        if not np.array_equal(self.env.get_env_state(), self.start):
-            return "get_env_state returns the environment's own array"
+        if isinstance(self.env, SuccessFlagEnv):
+            return _copies(self.env.inner, self.start[:-1]) or self._transition_copies()
+        return _copies(self.env, self.start) or self._transition_copies()
+
+    def _transition_copies(self) -> str:
         before = self.model.transition(self.start[None], self.controls[:1]).states
         kept = before.copy()
         self.model.transition(self.first.states[:1], self.controls[:1])
@@ -205,3 +225,18 @@ class _Trial:
             if not np.array_equal(self.env.get_env_state(), state):
                 return f"{state.tolist()} came back as {np.asarray(self.env.get_env_state()).tolist()}"
         return ""
+
+
+def _inner(env: Any) -> Any:
+    """Return the environment as its author wrote it."""
+    return env.inner if isinstance(env, RestorableEnv | SuccessFlagEnv) else env
+
+
+def _copies(env: Any, start: Array) -> str:
+    env.set_env_state(state := start.copy())
+    state += 1.0
+    if not np.array_equal(env.get_env_state(), start):
+        return "set_env_state keeps the array it is given"
+    taken = env.get_env_state()
+    taken += 1.0
+    return "" if np.array_equal(env.get_env_state(), start) else "get_env_state returns the environment's own array"

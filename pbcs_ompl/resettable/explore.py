@@ -49,5 +49,5 @@ def _declared(space: Any) -> tuple[Array, Array] | None:
 
 
 def _same(feature: Array, observation: Array) -> bool:
-    """Tell whether both are the same numbers; observations are often rounded to float32."""
+    """Return whether both are the same numbers; observations are often rounded to float32."""
     return np.array_equal(feature.astype(np.float32), observation.astype(np.float32))

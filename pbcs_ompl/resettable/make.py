@@ -60,8 +60,7 @@ def _make(spec: EnvSpec, goal: str | GoalRule | None, feature: str | FeatureRule
     load_environments()
     prefer_headless_rendering()
     model = adapt(_gymnasium_make(spec), goal=goal, feature=feature)
-    # The id keeps its module, if it names one.
-    model.spec = replace(spec, goal=model.spec.goal, feature=model.spec.feature)
+    model.spec = replace(model.spec, id=spec.id, start_seed=spec.start_seed)  # the id with its module, if it names one
     return model
 
 

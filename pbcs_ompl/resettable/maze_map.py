@@ -8,7 +8,7 @@ from pbcs_ompl.core.types import Array
 
 
 def has_map(env: Any) -> bool:
-    """Tell whether `env` is a maze of gymnasium-robotics."""
+    """Return whether `env` is a maze of gymnasium-robotics."""
     return hasattr(getattr(env, "maze", None), "maze_map")
 
 

@@ -67,7 +67,7 @@ def rule_text(kind: str, rule: str | GoalRule | FeatureRule) -> str:
 
 
 def goal_rule(rule: str) -> GoalRule:
-    """Return a function that tells whether an outcome is a success.
+    """Return a function that says whether an outcome is a success.
 
     Args:
         rule: `SOURCE[i] OP NUMBER`: the words of `SOURCES` and >, >=, <, <=, where all of the numbers that a slice

@@ -11,7 +11,7 @@ from pbcs_ompl.core.errors import InvalidState, NotResettable
 from pbcs_ompl.resettable import adapt, check_resettable, make
 from pbcs_ompl.resettable.adapters.classic import AttributeEnv
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel
-from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, following
+from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, child_hash
 
 
 class Slider(gymnasium.Env):
@@ -150,7 +150,7 @@ def test_names_are_exact_numbers() -> None:
     name = 3.0
     names = {name}
     for _ in range(1000):
-        name = following(name, np.array([0.25]))
+        name = child_hash(name, np.array([0.25]))
         assert name == int(name)
         assert 2**32 <= name < 2**53
         names.add(name)

@@ -48,27 +48,57 @@ def test_a_cart_is_a_model() -> None:
     assert model.spec.id == "Cart"
     assert model.feature_dims == (0,)
     np.testing.assert_array_equal(model.bin_size, [0.5])
-    states = np.array([[0.0, 0.5], [-1.0, 0.0]])
+    states = np.array([[0.0, 0.5, 0.0], [-1.0, 0.0, 0.0]])
     result = model.transition(states, np.array([[1.0], [-1.0]]))
-    np.testing.assert_allclose(result.states, [[0.06, 0.6], [-1.01, -0.1]])
+    np.testing.assert_allclose(result.states, [[0.06, 0.6, 1.0], [-1.01, -0.1, 0.0]])
     np.testing.assert_array_equal(result.success, [True, False])
-    assert model.step_one([0.0, 0.5], [1.0]) == result.states[0].tolist()
-    np.testing.assert_array_equal(model.is_valid(np.array([[0.0, 0.0], [9.0, 0.0], [np.nan, 0.0]])),
-                                  [True, False, False])
+    assert model.step_one([0.0, 0.5, 0.0], [1.0]) == result.states[0].tolist()
+    np.testing.assert_array_equal(model.is_valid(np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [np.nan, 0.0, 0.0],
+                                                           [0.0, 0.0, 0.5]])), [True, False, False, False])
 
 
-def test_success_is_remembered_where_there_is_no_distance() -> None:
-    model = adapt(Cart())
-    states = np.array([[0.0, 0.5], [0.0, -0.5]])
+def test_success_is_a_function_of_the_state() -> None:
+    model, other = adapt(Cart()), adapt(Cart())
+    states = np.array([[0.0, 0.5, 0.0], [0.0, -0.5, 0.0]])
     after = model.transition(states, np.ones((2, 1))).states
-    np.testing.assert_array_equal(model.goal_distance(after) < model.goal_threshold, [True, False])
-    assert model.goal_distance(states).tolist() == [1.0, 1.0]
+    np.testing.assert_array_equal(other.goal_distance(after) < other.goal_threshold, [True, False])
+    assert other.goal_distance(states).tolist() == [1.0, 1.0]
+
+
+def test_success_takes_no_part_in_distances_and_perturbations() -> None:
+    model = adapt(Cart())
+    assert model.distance(np.array([[0.3, 0.4, 1.0]]), np.zeros(3)) == pytest.approx([0.5])
+    drawn = model.perturb(np.array([0.0, 0.0, 1.0]), 0.1, 50, np.random.default_rng(0))
+    assert model.is_valid(drawn).all()
+    assert (drawn[:, 2] == 0.0).all()
+    assert (np.linalg.norm(drawn[:, :2], axis=1) <= 0.1).all()
+
+
+def test_misspelt_attributes_are_reported() -> None:
+    class Misspelt(Cart):
+        bin_sise = 0.1
+
+        def is_vaild(self, states: np.ndarray) -> np.ndarray:
+            return np.ones(len(states), bool)
+
+    with pytest.warns(UserWarning, match="has 'bin_sise', which is not read; did you mean 'bin_size'") as caught:
+        report = check_resettable(Misspelt())
+    assert any("'is_vaild'" in str(warning.message) for warning in caught)
+    assert "did you mean 'is_valid'" in str(report)
+    assert not report.ok
+
+
+@pytest.mark.parametrize(("attribute", "value"), [
+    ("parallel_batch", 0), ("parallel_batch", 2.5), ("observe", 3), ("bin_size", "small"), ("walls", "none")])
+def test_attributes_have_their_types(attribute: str, value: Any) -> None:
+    with pytest.raises(InvalidOption, match=f"the environment's {attribute} is"):
+        adapt(type("Wrong", (Cart,), {attribute: value})())
 
 
 def test_a_cart_passes_the_check() -> None:
     report = check_resettable(Cart())
     assert report.ok, str(report)
-    assert "can be reset anywhere" in str(report)
+    assert "is resettable" in str(report)
 
 
 def test_a_distance_to_the_goal_is_used() -> None:
@@ -99,8 +129,8 @@ def test_the_observation_serves_as_state_and_gives_the_bounds() -> None:
 
     model = adapt(Unobserved())
     assert model.capabilities == {"visited", "exact"}
-    np.testing.assert_array_equal(model.state_high, [5.0, 5.0])
-    np.testing.assert_array_equal(model.observe(np.array([[1.0, 2.0]])), [[1.0, 2.0]])
+    np.testing.assert_array_equal(model.state_high, [5.0, 5.0, 1.0])
+    np.testing.assert_array_equal(model.observe(np.array([[1.0, 2.0, 0.0]])), [[1.0, 2.0]])
 
 
 @pytest.mark.parametrize(("members", "complaint"), [
@@ -109,7 +139,7 @@ def test_the_observation_serves_as_state_and_gives_the_bounds() -> None:
     ({"state_low": np.array([-np.inf, 0.0])}, "finite vectors"),
     ({"state_low": np.zeros(3), "state_high": np.ones(3)}, "state_low has 3 dimensions"),
     ({"feature_dims": (5,)}, "feature_dims"),
-    ({"goal_distance": lambda self, states: states[:, 0]}, "no `goal_threshold`"),
+    ({"goal_distance": lambda self, states: states[:, 0]}, "set both"),
 ])
 def test_incomplete_environments(members: dict[str, Any], complaint: str) -> None:
     with pytest.raises(NotResettable, match=complaint):
@@ -118,12 +148,12 @@ def test_incomplete_environments(members: dict[str, Any], complaint: str) -> Non
 
 def test_bad_batches() -> None:
     model = adapt(Cart())
-    with pytest.raises(InvalidState, match=r"\[B, 2\]"):
-        model.transition(np.zeros((1, 3)), np.zeros((1, 1)))
+    with pytest.raises(InvalidState, match=r"\[B, 3\]"):
+        model.transition(np.zeros((1, 2)), np.zeros((1, 1)))
     with pytest.raises(InvalidOption, match="not finite"):
-        model.transition(np.zeros((1, 2)), np.full((1, 1), np.nan))
+        model.transition(np.zeros((1, 3)), np.full((1, 1), np.nan))
     with pytest.raises(InvalidOption, match="cannot be steered"):
-        model.advance_towards(np.zeros((1, 2)), np.zeros((1, 1)))
+        model.advance_towards(np.zeros((1, 3)), np.zeros((1, 1)))
 
 
 class Forgetful(Cart):

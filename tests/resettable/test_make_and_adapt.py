@@ -37,7 +37,7 @@ def test_a_module_that_does_not_exist() -> None:
 
 def test_an_id_with_its_module_can_be_made_again() -> None:
     model = make("pbcs_ompl.envs:pbcs/Maze-v0", {"size": 3})
-    assert make(model.spec).env_id == "pbcs_ompl.envs:pbcs/Maze-v0"
+    assert make(model.spec).spec.id == "pbcs_ompl.envs:pbcs/Maze-v0"
 
 
 @pytest.mark.parametrize(("kwargs", "error", "complaint"), [
@@ -73,7 +73,7 @@ def test_what_is_no_environment(thing: object, complaint: str) -> None:
 
 def test_an_incomplete_model_names_what_it_lacks() -> None:
     class Half:
-        env_id = "half"
+        spec = "half"
 
         def transition(self) -> None: ...
 
@@ -127,7 +127,7 @@ def test_observations_that_go_with_a_state_of_its_own(observation: gymnasium.Spa
 
 def test_wrappers_of_limits_and_rewards_are_taken_off() -> None:
     env = wrappers.RecordEpisodeStatistics(gymnasium.make("pbcs/Maze-v0"))
-    assert adapt(wrappers.TransformReward(env, lambda reward: 2 * reward)).env_id == "pbcs/Maze-v0"
+    assert adapt(wrappers.TransformReward(env, lambda reward: 2 * reward)).spec.id == "pbcs/Maze-v0"
 
 
 @pytest.mark.parametrize("wrap", [

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
 from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
-from pbcs_ompl.resettable.ball import uniform_in_ball
+from pbcs_ompl.resettable.sampling import uniform_in_ball
 
 MODEL = make("pbcs/Maze-v0", {"size": 3})
 

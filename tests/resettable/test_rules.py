@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import Outcome, feature_rule, goal_rule, reported_success, rule_text
@@ -90,18 +91,18 @@ def test_what_the_environment_reports() -> None:
 
 def test_functions_are_rules() -> None:
     model = make("Pendulum-v1", goal=upright, feature=height)
-    assert model.spec.kwargs == {"--goal": f"{__name__}:upright", "--feature": f"{__name__}:height"}
+    assert model.spec == EnvSpec("Pendulum-v1", {}, f"{__name__}:upright", f"{__name__}:height")
     assert model.feature_low.shape == (1,)
     again = make(model.spec)
     np.testing.assert_array_equal(again.initial_state(3), model.initial_state(3))
 
 
 def test_the_start_can_be_fixed() -> None:
-    free, fixed = make("Pendulum-v1"), make("Pendulum-v1", {"--start-seed": 3})
+    free, fixed = make("Pendulum-v1"), make("Pendulum-v1", start_seed=3)
     np.testing.assert_array_equal(fixed.initial_state(7), free.initial_state(3))
-    assert fixed.env_kwargs == {"--start-seed": 3}
-    with pytest.raises(InvalidOption, match="--start-seed"):
-        make("Pendulum-v1", {"--start-seed": -1})
+    assert fixed.spec == EnvSpec("Pendulum-v1", start_seed=3)
+    with pytest.raises(InvalidOption, match="start_seed is -1; expected an integer >= 0"):
+        make("Pendulum-v1", start_seed=-1)
 
 
 def test_functions_have_to_be_found_again() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.rules import FeatureRule, feature_rule
 
 
@@ -37,8 +38,8 @@ class AttributeEnv(RestorableEnv):
         return self.inner.state if observe is None else observe()
 
 
-def keeps_state(env: Any) -> bool:
-    """Tell whether `env` is one of Gymnasium's classic control environments with a vector `state`; resets it."""
+def has_state_attribute(env: Any) -> bool:
+    """Return whether `env` is one of Gymnasium's classic control environments with a vector `state`; resets it."""
     if not type(env).__module__.startswith("gymnasium.envs.classic_control"):
         return False
     env.reset(seed=0)
@@ -50,7 +51,8 @@ class VectorEnv(RestorableEnv):
 
     def default_feature(self) -> FeatureRule:
         """Return what the environment itself calls its feature, else all of its state."""
-        dims = list(getattr(self.inner, "feature_dims", range(len(self.inner.get_env_state()))))
+        offered = EnvAttributes.of(self.inner).feature_dims
+        dims = list(range(len(self.inner.get_env_state())) if offered is None else offered)
         return lambda outcome: np.asarray(outcome.env.get_env_state())[dims]
 
     def save(self) -> Array:
@@ -64,4 +66,5 @@ class VectorEnv(RestorableEnv):
     def observation(self) -> Any:
         """Return the environment's observation, its state where it has no `observe`."""
         state = self.save()
-        return self.inner.observe(state[None])[0] if hasattr(self.inner, "observe") else state
+        observe = EnvAttributes.of(self.inner).observe
+        return state if observe is None else observe(state[None])[0]

@@ -21,8 +21,8 @@ BROKEN = "4.0.0"
 """The version that computes wrong accelerations where the constraint Jacobian is sparse."""
 
 
-def shows_mujoco(env: Any) -> bool:
-    """Tell whether `env` has a MuJoCo model and its data."""
+def is_mujoco_env(env: Any) -> bool:
+    """Return whether `env` has a MuJoCo model and its data."""
     return type(getattr(env, "model", None)).__name__ == "MjModel" and hasattr(env, "data")
 
 
@@ -41,7 +41,7 @@ class MujocoEnv(RestorableEnv):
         self._physics = int(mujoco.mj_stateSize(inner.model, self._kinds))
         self._parts, self._has_goal = _moved_parts(inner)
         self._loaded = False
-        self.reach = float(getattr(inner, "distance_threshold", MAZE_REACH))
+        self.goal_radius = float(getattr(inner, "distance_threshold", MAZE_GOAL_RADIUS))
         if mujoco.__version__ == BROKEN and mujoco.mj_isSparse(inner.model):
             warnings.warn(f"mujoco {BROKEN} computes wrong accelerations for this model, whose constraint Jacobian is "
                           f"sparse; install mujoco 4.0.1 or newer, or 3.x", stacklevel=2)
@@ -102,7 +102,7 @@ class MujocoEnv(RestorableEnv):
         self._mujoco.mj_camlight(self.inner.model, self.inner.data)
         return self.inner.render()
 
-    def told_distance(self, outcome: Outcome) -> float | None:
+    def reported_goal_distance(self, outcome: Outcome) -> float | None:
         """Return the distance between achieved and desired goal, where they are points."""
         if not isinstance(outcome.observation, dict) or not self._has_goal:
             return None
@@ -130,7 +130,7 @@ class MujocoEnv(RestorableEnv):
         return np.concatenate([saved, *parts, *goal])
 
 
-MAZE_REACH = 0.45
+MAZE_GOAL_RADIUS = 0.45
 """The mazes of gymnasium-robotics call a success what is that close."""
 
 

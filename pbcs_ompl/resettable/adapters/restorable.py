@@ -31,7 +31,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
 
     Its state is [feature F | what `save` returns | distance to the goal]. The feature comes first, so it is a
     selection of state dimensions for OMPL, whatever computes it. The last number makes success a function of the
-    state: it is what the environment tells of its distance to the goal, else 0 in a success and 1 elsewhere.
+    state: it is the distance to the goal that the environment reports, else 0 in a success and 1 elsewhere.
 
     Args:
         inner: The environment without wrappers.
@@ -41,8 +41,8 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
 
     capabilities: frozenset[Capability] = frozenset({"visited", "exact"})
     perturb_by_rollouts = True
-    reach = 1.0
-    """A state is a success if its distance to the goal is smaller, where the environment tells one."""
+    goal_radius = 1.0
+    """A state is a success if its distance to the goal is smaller, where the environment reports one."""
 
     def __init__(self, inner: Any, goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None):
         self.inner = inner
@@ -54,10 +54,10 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.render_mode = inner.render_mode
         self.action_space = inner.action_space
         self._head, self._distance = np.empty(0), 1.0
-        self._tells_distance = False
+        self._has_goal_distance = False
         observation, _ = self.reset(seed=0)
         self.observation_space = Box(-np.inf, np.inf, observation.shape, np.float64)
-        self.goal_threshold = self.reach if self._tells_distance else 0.5
+        self.goal_threshold = self.goal_radius if self._has_goal_distance else 0.5
         saved = len(self.save())
         self.feature_dims = tuple(range(len(self._head)))
         low, high, self.bounds_from = feature_bounds(self, EXPLORED_STEPS)
@@ -85,8 +85,8 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         """Return what planners explore unless the user says otherwise."""
         return feature_rule("obs")
 
-    def told_distance(self, outcome: Outcome) -> float | None:
-        """Return the distance to the goal after `outcome`; None where the environment does not tell."""
+    def reported_goal_distance(self, outcome: Outcome) -> float | None:
+        """Return the distance to the goal after `outcome`; None where the environment reports none."""
         return None
 
     def feature_box(self) -> tuple[Array, Array] | None:
@@ -132,7 +132,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         return rows
 
     def goal_distance(self, states: Array) -> Array:
-        """Return the distances to the goal [B], as they were told when the states were reached."""
+        """Return the distances to the goal [B], as they were reported when the states were reached."""
         return np.array(states, dtype=np.float64)[:, -1]
 
     def distance(self, states: Array, others: Array) -> Array:
@@ -163,13 +163,13 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         if not len(self._head):
             raise CallbackFailed("the feature function returned no numbers")
         success = bool(self._is_success(outcome))
-        told = None if self.goal_rule is not None else self.told_distance(outcome)
-        self._tells_distance = told is not None
-        if told is None:
+        reported = None if self.goal_rule is not None else self.reported_goal_distance(outcome)
+        self._has_goal_distance = reported is not None
+        if reported is None:
             self._distance = 0.0 if success else 1.0
         else:
-            below = np.nextafter(self.reach, 0.0)
-            self._distance = min(told, below) if success else max(told, self.reach)
+            below = np.nextafter(self.goal_radius, 0.0)
+            self._distance = min(reported, below) if success else max(reported, self.goal_radius)
         return success
 
 

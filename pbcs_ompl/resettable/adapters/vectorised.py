@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.core.types import Array, BoolArray, Capability, Transition
+from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.model import Model
 
 
@@ -18,22 +19,24 @@ class VectorisedModel(Model):
     capabilities: frozenset[Capability] = frozenset({"visited", "arbitrary", "exact"})
 
     def __init__(self, env: Any):
-        super().__init__(env, env.state_low, env.state_high)
+        offers = EnvAttributes.of(env)
+        super().__init__(env, offers, env.state_low, env.state_high)
         self.goal_threshold = float(env.goal_threshold)
         self.transition: Callable[[Array, Array], Transition] = env.transition
         self.observe: Callable[[Array], Array] = env.observe
         self.goal_distance: Callable[[Array], Array] = env.goal_distance
-        self.step_one: Callable[[list[float], list[float]], list[float]] = getattr(
-            env, "step_one", self._step_one_by_transition)
+        self.step_one: Callable[[list[float], list[float]], list[float]] = (
+            offers.step_one or self._step_one_by_transition)
 
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, D] the environment can be in [B]."""
-        return self.env.is_valid(states)
+        valid: BoolArray = self.env.is_valid(states)
+        return valid
 
     def compiled_step(self) -> Any:
         """Return what the environment offers to compiled planners: its `compiled_step()`, or None."""
-        offer = getattr(self.env, "compiled_step", None)
-        return None if offer is None else offer()
+        return None if self._offers.compiled_step is None else self._offers.compiled_step()
 
     def _step_one_by_transition(self, state: list[float], control: list[float]) -> list[float]:
-        return self.transition(np.array([state]), np.array([control])).states[0].tolist()
+        following: list[float] = self.transition(np.array([state]), np.array([control])).states[0].tolist()
+        return following

@@ -64,7 +64,7 @@ class VisitedEnv(RestorableEnv):
         """Make one step, and name where it leads."""
         before = self._name
         outcome = super().step(action)
-        self._name = following(before, action)
+        self._name = child_hash(before, action)
         self._observations[self._name] = flat(outcome[0])
         self.keep(self._name, before, action)
         return outcome
@@ -123,7 +123,7 @@ class ReplayedEnv(VisitedEnv):
             self.inner.step(action)
 
 
-def following(name: float, action: Array) -> float:
+def child_hash(name: float, action: Array) -> float:
     """Return the name of what follows a state under an action: a hash of both in [2**32, 2**53)."""
     digest = blake2b(struct.pack("<d", name) + np.ascontiguousarray(action).tobytes(), digest_size=8).digest()
     return FIRST_HASH + float(int.from_bytes(digest, "little") % (2**53 - 2**32))

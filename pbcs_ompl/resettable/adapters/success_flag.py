@@ -1,0 +1,160 @@
+"""Success as part of the state, for environments that report it only when a step is made."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from pbcs_ompl.core.errors import NotResettable
+from pbcs_ompl.core.types import Array, BoolArray
+from pbcs_ompl.resettable.attributes import EnvAttributes
+from pbcs_ompl.resettable.sampling import uniform_in_ball
+
+
+class SuccessFlagEnv(gymnasium.Env[Array, Array]):
+    """An environment with `get_env_state` and `set_env_state` but no `goal_distance`.
+
+    Its state is [state of the environment N | success]. The last number is 1 where the step that led there was a
+    success: what `info["is_success"]` or `info["success"]` says, else `terminated`. So success is a function of the
+    state, in any process. States that no step has reached, as those of a reset or of a ball, are no successes.
+
+    Args:
+        inner: The environment without wrappers.
+        offers: Its optional attributes.
+
+    Raises:
+        NotResettable: its bounds or observations are missing.
+    """
+
+    goal_threshold = 0.5
+
+    def __init__(self, inner: Any, offers: EnvAttributes):
+        self.inner, self._offers = inner, offers
+        self.spec, self.render_mode = inner.spec, inner.render_mode
+        self.action_space, self.observation_space = inner.action_space, inner.observation_space
+        self._success = 0.0
+        observation, _ = inner.reset(seed=0)
+        state = as_vector(inner, inner.get_env_state())
+        self._observes_state = observes_state(observation, state)
+        low, high = state_bounds(inner, offers, state, self._observes_state)
+        self.state_low, self.state_high = np.append(low, 0.0), np.append(high, 1.0)
+        if offers.observe is None and not self._observes_state:
+            raise NotResettable(missing_observe(inner))
+        self.capabilities = offers.restores
+        self.feature_dims = tuple(range(len(state))) if offers.feature_dims is None else offers.feature_dims
+        # What the environment offers itself; `EnvAttributes` takes None for what is not offered.
+        self.bin_size, self.max_episode_steps = offers.bin_size, offers.max_episode_steps
+        self.parallel_batch, self.perturb_by_rollouts = offers.parallel_batch, offers.perturb_by_rollouts
+        self.walls, self.goal_circle = offers.walls, offers.goal_circle
+        self.advance_towards = None if offers.advance_towards is None else self._advance_towards
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Reset the environment."""
+        self._success = 0.0
+        observation, info = self.inner.reset(seed=seed, options=options)
+        return observation, info
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Make one step of the environment."""
+        observation, reward, terminated, truncated, info = self.inner.step(action)
+        self._success = float(bool(info.get("is_success", info.get("success", terminated))))
+        return observation, float(reward), bool(terminated), bool(truncated), info
+
+    def get_env_state(self) -> Array:
+        """Return the state [N + 1]."""
+        return np.append(as_vector(self.inner, self.inner.get_env_state()), self._success)
+
+    def set_env_state(self, state: Array) -> None:
+        """Go back to a state [N + 1]."""
+        self._success = float(state[-1])
+        self.inner.set_env_state(np.array(state[:-1]))
+
+    def observe(self, states: Array) -> Array:
+        """Return the observations [B, O] of states [B, N + 1]."""
+        inner = np.array(states, dtype=np.float64)[:, :-1].copy()
+        return inner if self._offers.observe is None else self._offers.observe(inner)
+
+    def goal_distance(self, states: Array) -> Array:
+        """Return 0 for successes, 1 for other states [B]."""
+        return 1.0 - np.asarray(states, dtype=np.float64)[:, -1]
+
+    def is_valid(self, states: Array) -> BoolArray:
+        """Return which states [B, N + 1] the environment calls valid [B]; within the bounds, where it says nothing."""
+        states = np.asarray(states, dtype=np.float64)
+        flagged: BoolArray = (states[:, -1] == 0.0) | (states[:, -1] == 1.0)
+        if self._offers.is_valid is not None and flagged.any():
+            flagged[flagged] = self._offers.is_valid(states[flagged, :-1].copy())
+        return flagged
+
+    def distance(self, states: Array, others: Array) -> Array:
+        """Return the distances [B] between states, whatever their success."""
+        states, others = np.asarray(states)[:, :-1], np.asarray(others)[..., :-1]
+        if self._offers.distance is not None:
+            return self._offers.distance(states, others)
+        lengths: Array = np.linalg.norm(states - others, axis=1)
+        return lengths
+
+    def perturb(self, state: Array, radius: float, count: int, rng: np.random.Generator) -> Array:
+        """Draw states [count, N + 1] in the ball around a state, none of them a success."""
+        draw = self._offers.perturb or uniform_in_ball
+        return np.hstack([draw(state[:-1], radius, count, rng), np.zeros((count, 1))])
+
+    def render(self) -> Any:
+        """Render the environment."""
+        return self.inner.render()
+
+    def close(self) -> None:
+        """Close the environment."""
+        self.inner.close()
+
+    def _advance_towards(self, states: Array, targets: Array) -> Array:
+        assert self._offers.advance_towards is not None
+        return self._offers.advance_towards(np.asarray(states)[:, :-1].copy(), targets)
+
+
+def as_vector(env: Any, state: Any) -> Array:
+    """Return what `get_env_state` returned as a new vector [N].
+
+    Raises:
+        NotResettable: it is none.
+    """
+    if not isinstance(state, np.ndarray | list | tuple) or np.ndim(state) != 1:
+        raise NotResettable(f"{type(env).__name__}.get_env_state() returned a {type(state).__name__}; "
+                            f"expected a vector of numbers")
+    return np.array(state, dtype=np.float64)
+
+
+def observes_state(observation: Any, state: Array) -> bool:
+    """Return whether an observation is the state itself."""
+    return np.shape(observation) == state.shape and bool(np.array_equal(state, observation))
+
+
+def missing_observe(env: Any) -> str:
+    """Return the message for an environment whose states cannot be observed."""
+    return (f"{type(env).__name__}: the observation is not the state, so implement "
+            f"`observe(states [B, D]) -> observations [B, O]`")
+
+
+def state_bounds(env: Any, offers: EnvAttributes, state: Array, observes: bool) -> tuple[Array, Array]:
+    """Return the bounds of the state [N] that the environment declares, else those of its observations.
+
+    Args:
+        env: The environment.
+        offers: Its optional attributes.
+        state: One of its states [N].
+        observes: Whether the observation is the state.
+
+    Raises:
+        NotResettable: there are none, or they have another length.
+    """
+    box = env.observation_space
+    if offers.state_low is not None and offers.state_high is not None:
+        low, high = np.asarray(offers.state_low), np.asarray(offers.state_high)
+    elif observes and np.isfinite(box.low).all() and np.isfinite(box.high).all():
+        low, high = box.low, box.high
+    else:
+        raise NotResettable(f"{type(env).__name__}: the bounds of its {len(state)} state dimensions are "
+                            f"unknown; set `state_low` and `state_high`")
+    if low.shape != state.shape:
+        raise NotResettable(f"{type(env).__name__}: state_low has {low.size} dimensions, the state has {len(state)}")
+    return low, high
