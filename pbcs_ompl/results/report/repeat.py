@@ -85,7 +85,7 @@ def _given_trajectory(folder: Path) -> Path | None:
 
 
 def _study_words(config: dict[str, Any]) -> Words:
-    """Return nothing where no study at hand has this name and this sweep: it would be another study."""
+    """Return nothing if no study that is available has this name and this sweep: it would be another study."""
     sweep = {key: value for key, value in config.items() if key not in ("kind", "study", "folder", "seeds")}
     places = [(name, place) for name, place in study_folders().items() if name == config["study"]]
     places += [(config["folder"], Path(config["folder"]))] if "folder" in config else []
