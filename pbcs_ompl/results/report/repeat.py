@@ -104,6 +104,6 @@ def _comparison_script(config: dict[str, Any]) -> str:
     environments = [EnvSpec.from_dict(place) for place in config["environments"]]
     settings = {name: config[name] for name in ("seeds", *BUDGETS) if name in config}
     return "\n".join([
-        "from pbcs_ompl.core.env_spec import EnvSpec", "from pbcs_ompl.experiments.compare import compare", "",
+        "from pbcs_ompl import EnvSpec, compare", "",
         'if __name__ == "__main__":', f"    compare({planners!r},", f"            {environments!r},",
         *(f"            {name}={value!r}," for name, value in settings.items()), '            out="runs/again")'])
