@@ -5,7 +5,7 @@
 
 import sys
 
-from pbcs_ompl.experiments.compare import compare
+from pbcs_ompl import compare
 
 
 def main(seeds: str = "5") -> None:

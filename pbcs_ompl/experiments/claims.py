@@ -24,7 +24,7 @@ class Claim:
         agrees: Whether the data agree; None when they cannot decide.
         numbers: The numbers that decide, with their N; see `rate`.
         source: Where the claim comes from.
-        note: A look at why, where there is something to say.
+        note: An explanation, if there is one.
     """
 
     claim: str
@@ -54,7 +54,7 @@ def greater(claim: str, first: Mapping[Key, float], second: Mapping[Key, float],
         first, second: A number for each seed, or whatever else pairs them.
         names: What to call the two.
         source: Where the claim comes from.
-        note: A look at why.
+        note: An explanation.
     """
     keys = [key for key in first if key in second]
     one, other = np.array([first[key] for key in keys]), np.array([second[key] for key in keys])

@@ -28,7 +28,7 @@ class LoopSettings:
         steps: Environment steps of each seed, in each of its copies of the environment.
         copies: Copies of the environment for each seed, side by side.
         episode_steps: Longest episode.
-        block: Steps between two trainings, which then make up for all of them. With the length of an episode, a seed
+        block: Steps between two trainings; each makes the updates of all of them. With the length of an episode, a seed
             that has not found the reward trains after each episode, as in [Matheron2020] 6.2.2.
         updates_per_transition: Gradient steps for each environment step.
         evaluate_every: Steps between two evaluations, a multiple of `block`.

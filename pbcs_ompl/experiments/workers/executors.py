@@ -12,7 +12,7 @@ from pbcs_ompl.experiments.workers.worker import Limits, Worker
 
 
 class Executor(Protocol):
-    """What executes runs: processes of this machine, or a cluster as `ray_cluster` gives it."""
+    """What executes runs: processes of this machine, or a cluster (see `ray_cluster`)."""
 
     def __call__(self, runs: Sequence[Run], function: RunFunction,
                  limits: Limits) -> Generator[tuple[Run, Record | Failure], None, None]:

@@ -85,7 +85,7 @@ def _given_trajectory(folder: Path) -> Path | None:
 
 
 def _study_words(config: dict[str, Any]) -> Words:
-    """Return nothing where no study at hand has this name and this sweep: it would be another study."""
+    """Return nothing if no study that is available has this name and this sweep: it would be another study."""
     sweep = {key: value for key, value in config.items() if key not in ("kind", "study", "folder", "seeds")}
     places = [(name, place) for name, place in study_folders().items() if name == config["study"]]
     places += [(config["folder"], Path(config["folder"]))] if "folder" in config else []
@@ -104,6 +104,6 @@ def _comparison_script(config: dict[str, Any]) -> str:
     environments = [EnvSpec.from_dict(place) for place in config["environments"]]
     settings = {name: config[name] for name in ("seeds", *BUDGETS) if name in config}
     return "\n".join([
-        "from pbcs_ompl.core.env_spec import EnvSpec", "from pbcs_ompl.experiments.compare import compare", "",
+        "from pbcs_ompl import EnvSpec, compare", "",
         'if __name__ == "__main__":', f"    compare({planners!r},", f"            {environments!r},",
         *(f"            {name}={value!r}," for name, value in settings.items()), '            out="runs/again")'])

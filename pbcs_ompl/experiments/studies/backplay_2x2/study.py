@@ -28,7 +28,7 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
-    """Train once, or look where agents go."""
+    """Train once, or count the visits of agents."""
     if settings["label"] == "alone":
         return _alone(settings)
     record, _ = trained("pbcs/Maze-v0", MAZE, agent_settings={"discount": settings["discount"]},

@@ -21,7 +21,7 @@ HALF_WALL = 0.05
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
-    """One run for each stack of each variant, and one that looks at mini-batches."""
+    """One run for each stack of each variant, and one of mini-batches."""
     common = {key: sweep[key] for key in ("evaluate_every", "episode_steps", "device")}
     stacks = [{"name": f"{variant}-{chunk[0]}-{chunk[-1]}", "variant": variant, "seeds": chunk, **common, **options,
                "agent": sweep["agent"] | options.get("agent", {})}
@@ -31,7 +31,7 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
-    """Explore, train, and take down what became of the first seed's critic; or look at mini-batches."""
+    """Explore, train, and record the critic of the first seed; or sample a mini-batch."""
     model = make("pbcs/Maze-v0", {"size": settings["size"], "wall_penalty": -1.0, "terminate_on_success": False})
     if settings["variant"] == "mini-batch":
         return settings | _mini_batches(model, settings["seeds"], settings["explored"], settings["count"])
