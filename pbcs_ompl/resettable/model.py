@@ -74,13 +74,15 @@ class Model:
         return np.linalg.norm(np.asarray(states) - others, axis=1)
 
     def perturb(self, state: Array, radius: float, count: int, rng: np.random.Generator, *,
-                reject_invalid: bool = True, before: Array | None = None, counter: Counter | None = None) -> Array:
+                reject_invalid: bool = True, before: Array | None = None, rollout_steps: int = 5,
+                counter: Counter | None = None) -> Array:
         """Draw states [count, D] around `state` [D]: uniformly from the ball, or by random rollouts that end in it.
 
         Invalid states are drawn again; what a rollout reaches is valid.
 
         Args:
             before: States [N, D] that lead to `state`: rollouts begin there as well.
+            rollout_steps: The most steps of a rollout.
             counter: Where the steps of rollouts are counted.
 
         Raises:
@@ -89,7 +91,8 @@ class Model:
         """
         if self._by_rollouts:
             model = cast(ResettableModel, self)
-            return reached_in_ball(model, np.asarray(state, dtype=np.float64), radius, count, rng, before, counter)
+            return reached_in_ball(model, np.asarray(state, dtype=np.float64), radius, count, rng, before=before,
+                                   rollout_steps=rollout_steps, counter=counter)
         return valid_in_ball(state, radius, count, rng, self.is_valid if reject_invalid else None)
 
     def is_valid(self, states: Array) -> BoolArray:

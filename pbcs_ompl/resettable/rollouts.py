@@ -6,13 +6,12 @@ from pbcs_ompl.core.errors import InvalidOption, InvalidState
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, Counter
 
-MAX_STEPS = 5
 MAX_ROUNDS = 50
 
 
-def reached_in_ball(model: ResettableModel, state: Array, radius: float, count: int, rng: np.random.Generator,
-                    before: Array | None = None, counter: Counter | None = None) -> Array:
-    """Return states [count, D] within `radius` of `state` [D] that 0 to 5 random steps reach from it or from `before`.
+def reached_in_ball(model: ResettableModel, state: Array, radius: float, count: int, rng: np.random.Generator, *,
+                    before: Array | None = None, rollout_steps: int = 5, counter: Counter | None = None) -> Array:
+    """Return states [count, D] within `radius` of `state` [D] that few random steps reach from it or from `before`.
 
     Source: [Matheron2020] 7.2.4 perturbs in a ball, and proposes to run the environment backwards at random within it,
     which finds what is about to arrive at the state. Differs: a vector near the state of a simulator may have legs in
@@ -20,6 +19,8 @@ def reached_in_ball(model: ResettableModel, state: Array, radius: float, count: 
     `before` [N, D]. From `state` alone it would only find what has passed it.
 
     Args:
+        before: States [N, D] that lead to `state`.
+        rollout_steps: The most steps of a rollout.
         counter: Where the steps are counted.
 
     Raises:
@@ -33,18 +34,18 @@ def reached_in_ball(model: ResettableModel, state: Array, radius: float, count: 
     for _ in range(MAX_ROUNDS):
         if len(found) >= count:
             return found[:count]
-        reached = _roll(model, sources[rng.integers(0, len(sources), count)], rng, counter or Counter())
+        reached = _roll(model, sources[rng.integers(0, len(sources), count)], rng, rollout_steps, counter or Counter())
         found = np.concatenate([found, reached[model.distance(reached, state) <= radius]])
     if len(found) < count:
         raise InvalidState(f"random rollouts leave the ball of radius {radius:g} around the state; take a larger one")
     return found[:count]
 
 
-def _roll(model: ResettableModel, states: Array, rng: np.random.Generator, counter: Counter) -> Array:
-    """Return what `states` [B, D] become in 0 to MAX_STEPS random steps each; ended episodes are left out."""
-    steps = rng.integers(0, MAX_STEPS + 1, len(states))
+def _roll(model: ResettableModel, states: Array, rng: np.random.Generator, most: int, counter: Counter) -> Array:
+    """Return what `states` [B, D] become in 0 to `most` random steps each; ended episodes are left out."""
+    steps = rng.integers(0, most + 1, len(states))
     ended = np.zeros(len(states), dtype=np.bool_)
-    for step in range(MAX_STEPS):
+    for step in range(most):
         moving = np.flatnonzero((steps > step) & ~ended)
         if not len(moving):
             break

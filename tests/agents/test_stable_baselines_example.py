@@ -8,9 +8,10 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from pbcs_ompl.skills.agent_door import load_agent
+
 from pbcs_ompl.agents import TD3Settings
 from pbcs_ompl.core.errors import InvalidOption, PbcsError, UnknownName
-from pbcs_ompl.skills.agent_door import load_agent
 
 LOW, HIGH = np.array([-1.0, 0.0]), np.array([0.5, 10.0])
 
