@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pbcs_ompl.skills.agent_door import load_agent
+from pbcs_ompl.skills.agent_interface import load_agent
 
 from pbcs_ompl.agents import DDPG, StackedAgent
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
