@@ -25,7 +25,7 @@ def main(updates: str = "5000", folder: str = "runs/example-critic") -> None:
     agent = DDPG(model.observation_size, model.action_low, model.action_high, seeds=(0,),
                  settings=DDPGSettings.from_preset("fast"))  # a stack of one agent, axis S first
     agent.add_transitions(model.observe(states)[None], controls[None], outcome.rewards[None],
-                   model.observe(outcome.states)[None], outcome.terminated[None])
+                          model.observe(outcome.states)[None], outcome.terminated[None])
     agent.train(int(updates))
 
     def policy(observations):

@@ -27,7 +27,7 @@ class Spaces(gymnasium.Env):
 class StableTD3:
     """Arrays are [S, B, ...] for a stack of S agents; this one is always a stack of one."""
 
-    settings_type = TD3Settings  # any class with from_preset(name, **changes)
+    settings_type = TD3Settings  # any class with from_preset(name, **changes), to_dict and from_dict
     BUFFER = ("observations", "next_observations", "actions", "rewards", "dones")
 
     def __init__(self, observation_size, action_low, action_high, *, settings, seeds, device="cpu"):

@@ -12,18 +12,19 @@ from pbcs_ompl.figures.chain import chain_figure
 
 
 def main(size: str = "2", folder: str = "runs/example-chain") -> None:
-    maze = {"size": int(size)}
-    model = pbcs_ompl.make("pbcs/Maze-v0", maze)
+    model = pbcs_ompl.make("pbcs/Maze-v0", {"size": int(size)})
     plan = pbcs_ompl.plan(model, planner="Ex", seed=0)
     if plan.trajectory is None:
         sys.exit("no path was found")
     print(f"plan: {plan.path_length} steps, open loop")
 
-    result = pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=maze, trajectory=plan.trajectory, seed=0)
+    result = pbcs_ompl.train(model, trajectory=plan.trajectory, seed=0)
+    if result.chain is None:
+        sys.exit(result.reason)
     print(f"chain: {len(result.chain.skills)} skills, {result.summary()['train_transitions']:,} transitions")
     for epsilon in (0.0, 0.1, 0.2):
-        rate = pbcs_ompl.evaluate(result.chain, model, epsilon=epsilon).summary()["success_rate"]
-        print(f"success with {epsilon:.0%} random actions: {rate:.0%}")
+        evaluation = pbcs_ompl.evaluate(result.chain, epsilon=epsilon)
+        print(f"success with {epsilon:.0%} random actions: {evaluation.success_rate:.0%}")
 
     result.chain.save(folder)
     chain = pbcs_ompl.SkillChain.load(folder)

@@ -131,6 +131,7 @@ def _train(verb: Parser) -> None:
     verb.add_argument("--method", default="pbcs", metavar="NAME",
                       help="pbcs, pb, backplay, plain, bootstrapped or offline (pbcs)")
     _add_planner(verb)
+    verb.set_defaults(planner=None)  # Ex, or none beside --path
     verb.add_argument("--agent", default="ddpg", metavar="NAME", help="registered, or module:Class (ddpg)")
     verb.add_argument("--device", default="cpu", metavar="NAME", help="where the agent learns: cpu or cuda (cpu)")
     verb.add_argument("--preset", default="fast", metavar="NAME",

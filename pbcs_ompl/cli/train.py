@@ -8,7 +8,7 @@ from pbcs_ompl.cli.arguments import build_parser, environment
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_chain
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary, warn
-from pbcs_ompl.core.errors import InvalidOption, TrainingStalled
+from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import duration, percent, short
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words, resume_words
@@ -27,13 +27,12 @@ def run(arguments: Namespace) -> int:
         out = Path(arguments.out or fresh_folder("train", arguments.env, arguments.method, arguments.seed))
     try:
         result = _train(arguments, out)
-    except TrainingStalled as error:
-        warn(str(error))
-        result = error.result
     except KeyboardInterrupt:
         if (out / CONFIG).is_file():
             raise KeyboardInterrupt(f"continue with: {command(resume_words(out))}") from None
         raise
+    if result.reason is not None:
+        warn(result.reason)
     _draw(result, out)
     print_summary(result.summary(), _closing_lines(result, out), as_json=arguments.json)
     return 0 if result.solved else 1
@@ -70,7 +69,7 @@ def _draw(result: TrainResult, out: Path) -> None:
         return
     model = make(result.chain.environment)
     trajectory = None if result.trajectory is None else result.trajectory.states
-    rollout = None if result.stalled else result.chain.rollout(model)
+    rollout = result.chain.rollout(model) if result.complete else None
     title = (f"{model.spec.id}: {len(result.chain.skills)} skills, "
              f"{result.train_transitions:,} transitions, {result.updates:,} updates")
     draw_chain(model, result.chain, trajectory, rollout, title, out)
@@ -89,6 +88,6 @@ def _closing_lines(result: TrainResult, out: Path) -> list[tuple[str, str]]:
         rate = percent(result.robust.success_rate, result.robust.wilson)
         lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions"))
     lines.append(("files", list_files(out)))
-    if result.stalled is None:
+    if result.complete:
         return [*lines, ("next", command(eval_words(out, epsilon=0.2)))]
     return [*lines, ("next", f"{command(resume_words(out))} --max-transitions N, with a larger N")]

@@ -6,7 +6,6 @@ Every mistake of a user ends in one of these. The command line prints the messag
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import Any
 
 
 def did_you_mean(name: str, choices: Iterable[str]) -> str:
@@ -74,13 +73,3 @@ class Mismatch(PbcsError):
 
 class RunFolderError(PbcsError):
     """A result folder that exists, is in use by another process, or cannot be written."""
-
-
-class TrainingStalled(PbcsError):
-    """Skill training used up its budget; `result` holds what was learnt so far."""
-
-    exit_code = 1
-
-    def __init__(self, message: str, result: Any):
-        super().__init__(message)
-        self.result = result

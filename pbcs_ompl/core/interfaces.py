@@ -87,11 +87,12 @@ class ResettableModel(Protocol):
         ...
 
     def perturb(self, state: Array, radius: float, count: int, rng: np.random.Generator, *,
-                reject_invalid: bool = True, before: Array | None = None, counter: "Counter | None" = None) -> Array:
+                reject_invalid: bool = True, before: Array | None = None, rollout_steps: int = 5,
+                counter: "Counter | None" = None) -> Array:
         """Draw `count` states [count, D] within `radius` of `state` [D]; invalid ones are drawn again.
 
-        Where that takes steps of the environment, they begin in the states `before` [N, D] that lead to `state` as
-        well, and are counted in `counter`.
+        Where that takes steps of the environment, at most `rollout_steps` for each rollout, they begin in the states
+        `before` [N, D] that lead to `state` as well, and are counted in `counter`.
 
         Raises:
             InvalidState: no valid state was found near `state`.

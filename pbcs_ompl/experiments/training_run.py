@@ -3,8 +3,6 @@
 import time
 from typing import Any
 
-from pbcs_ompl.core.errors import TrainingStalled
-from pbcs_ompl.resettable import make
 from pbcs_ompl.skills import TrainResult, evaluate, train
 
 
@@ -20,15 +18,12 @@ def trained(env: str, env_kwargs: dict[str, Any], **options: Any) -> tuple[dict[
         options: Those of `pbcs_ompl.train`.
 
     Raises:
-        UnknownName, InvalidOption and others: as `pbcs_ompl.train`, but not TrainingStalled.
+        UnknownName, InvalidOption and others: as `pbcs_ompl.train`.
     """
     began = time.process_time()
-    try:
-        result = train(env, env_kwargs=env_kwargs, **options)
-    except TrainingStalled as stalled:
-        result = stalled.result
+    result = train(env, env_kwargs=env_kwargs, **options)
     spent = time.process_time() - began
-    evaluation = None if result.chain is None else evaluate(result.chain, make(env, env_kwargs), episodes=1)
+    evaluation = None if result.chain is None else evaluate(result.chain, episodes=1)
     succeeds = evaluation is not None and evaluation.success_rate == 1.0
     record = result.summary() | {"env_kwargs": env_kwargs, "cpu_seconds": spent, "succeeds": succeeds,
                                  "transitions": result.plan_transitions + result.train_transitions}

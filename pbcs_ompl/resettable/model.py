@@ -66,7 +66,8 @@ class Model:
         return lengths
 
     def perturb(self, state: Array, radius: float, count: int, rng: np.random.Generator, *,
-                reject_invalid: bool = True, before: Array | None = None, counter: Counter | None = None) -> Array:
+                reject_invalid: bool = True, before: Array | None = None, rollout_steps: int = 5,
+                counter: Counter | None = None) -> Array:
         """Draw states [count, D] near a state: the environment's way, from the ball, or by rollouts that end in it.
 
         Invalid states are drawn again; a state that a rollout reaches is valid.
@@ -78,6 +79,7 @@ class Model:
             rng: The random numbers.
             reject_invalid: Draw invalid states again.
             before: States [N, D] that lead to `state`: rollouts begin there as well.
+            rollout_steps: The most steps of a rollout.
             counter: Where the steps of rollouts are counted.
 
         Raises:
@@ -87,7 +89,8 @@ class Model:
         check_radius(radius)
         centre = np.asarray(state, dtype=np.float64)
         if self._offers.perturb_by_rollouts:
-            return roll_near(cast(ResettableModel, self), centre, radius, count, rng, before, counter)
+            return roll_near(cast(ResettableModel, self), centre, radius, count, rng, before=before,
+                             rollout_steps=rollout_steps, counter=counter)
         draw = self._offers.perturb or uniform_in_ball
         return draw_valid(lambda number: draw(centre, radius, number, rng), count,
                           self.is_valid if reject_invalid else None, f"{radius:g} of {centre.tolist()}")

@@ -13,8 +13,6 @@ from pbcs_ompl.core.types import Array, BoolArray, Counter
 
 MAX_DRAWS = 200
 MAX_ROLLOUTS = 50
-MAX_STEPS = 5
-"""Steps of a rollout."""
 
 
 def uniform_in_ball(centre: Array, radius: float, count: int, rng: np.random.Generator) -> Array:
@@ -68,9 +66,9 @@ def check_radius(radius: float) -> None:
         raise InvalidOption(f"radius={radius!r}: expected a finite number >= 0")
 
 
-def roll_near(model: ResettableModel, state: Array, radius: float, count: int, rng: np.random.Generator,
-              before: Array | None = None, counter: Counter | None = None) -> Array:
-    """Return states [count, D] near a state that 0 to 5 random steps reach from it or from states before it.
+def roll_near(model: ResettableModel, state: Array, radius: float, count: int, rng: np.random.Generator, *,
+              before: Array | None = None, rollout_steps: int = 5, counter: Counter | None = None) -> Array:
+    """Return states [count, D] near a state that few random steps reach from it or from states before it.
 
     Differs from [Matheron2020] 7.2.4, which draws in a ball and proposes to run the environment backwards at random: a
     vector near the state of a simulator may have legs in the floor, a state that the simulator reaches does not; and it
@@ -83,6 +81,7 @@ def roll_near(model: ResettableModel, state: Array, radius: float, count: int, r
         count: How many.
         rng: The random numbers.
         before: States [N, D] that lead to `state`.
+        rollout_steps: The most steps of a rollout; their number is drawn from 0 to this one.
         counter: Counts the steps.
 
     Raises:
@@ -93,18 +92,18 @@ def roll_near(model: ResettableModel, state: Array, radius: float, count: int, r
     for _ in range(MAX_ROLLOUTS):
         if len(found) >= count:
             return found[:count]
-        reached = _roll(model, sources[rng.integers(0, len(sources), count)], rng, counter or Counter())
+        reached = _roll(model, sources[rng.integers(0, len(sources), count)], rng, rollout_steps, counter or Counter())
         found = np.concatenate([found, reached[model.distance(reached, state) <= radius]])
     if len(found) < count:
         raise InvalidState(f"random rollouts leave the ball of radius {radius:g} around the state; take a larger one")
     return found[:count]
 
 
-def _roll(model: ResettableModel, states: Array, rng: np.random.Generator, counter: Counter) -> Array:
-    """Return what `states` [B, D] become in 0 to MAX_STEPS random steps each; ended episodes are left out."""
-    steps = rng.integers(0, MAX_STEPS + 1, len(states))
+def _roll(model: ResettableModel, states: Array, rng: np.random.Generator, most: int, counter: Counter) -> Array:
+    """Return what `states` [B, D] become in 0 to `most` random steps each; ended episodes are left out."""
+    steps = rng.integers(0, most + 1, len(states))
     ended = np.zeros(len(states), dtype=np.bool_)
-    for step in range(MAX_STEPS):
+    for step in range(most):
         moving = np.flatnonzero((steps > step) & ~ended)
         if not len(moving):
             break

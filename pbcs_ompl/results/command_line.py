@@ -36,9 +36,11 @@ def train_words(config: dict[str, Any], trajectory: Path | None = None) -> Words
 
     Args:
         config: Its settings.
-        trajectory: The trajectory that was given to it; None where it was planned.
+        trajectory: The trajectory that was given to it; None where it was planned, or where there is no plan.
     """
-    planning = _planner(config) if trajectory is None else ["--path", str(trajectory)]
+    planning = [] if trajectory is None else ["--path", str(trajectory)]
+    if "planner" in config:
+        planning = _planner(config)
     named = [word for name in ("method", "agent", "preset", "device", "seed")
              for word in (f"--{name}", str(config[name]))]
     return ["train", *_environment(config), *planning, *named, *_json_words("--settings", config["settings"]),

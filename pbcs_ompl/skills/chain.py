@@ -10,16 +10,13 @@ from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.results.files import read_arrays, read_json, write_arrays, write_json
+from pbcs_ompl.skills.activation_sets import ActivationSet, Target, from_arrays, kind_of, to_arrays
 from pbcs_ompl.skills.episodes import with_random_actions
-from pbcs_ompl.skills.goals import ActivationSet, Goal
-from pbcs_ompl.skills.milestones import Milestones
 from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
-from pbcs_ompl.skills.set_arrays import from_arrays, kind_of, to_arrays
+from pbcs_ompl.skills.waypoints import Waypoints
 
 FORMAT = "pbcs_ompl skill chain"
-VERSION = 2
-PATIENCE = 2
-"""An execution may take this many times the steps that the skills were trained for."""
+VERSION = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +25,7 @@ class Skill:
 
     policy: SkillPolicy
     activation: ActivationSet
-    goal: Goal
+    target: Target
 
 
 @dataclass(frozen=True)
@@ -36,7 +33,7 @@ class Rollouts:
     """What a batch of executions of a chain did.
 
     Attributes:
-        success: Which executions reached the environment's target [B].
+        success: Which executions reached the environment's goal [B].
         steps: Steps until then, or until the time limit [B].
         skills: The index of the skill each execution ended in [B].
         states: The states of the first execution, for pictures [T+1, D].
@@ -50,7 +47,7 @@ class Rollouts:
 
 @dataclass(frozen=True, eq=False)
 class SkillChain:
-    """Ordered skills, from the environment's start to its target; [Matheron2020] section 7.2.
+    """Ordered skills, from the environment's start to its goal; [Matheron2020] section 7.2.
 
     The chain switches to a later skill as soon as that skill's activation set is entered, and never goes back.
 
@@ -67,10 +64,15 @@ class SkillChain:
     time_limit: int
 
     @classmethod
-    def of(cls, skills: list[Skill], milestones: Milestones) -> "SkillChain":
-        """Return the chain of skills that were trained along `milestones`."""
-        model, limit = milestones.model, PATIENCE * milestones.settings.max_steps * len(skills)
-        return cls(tuple(skills), milestones.states[0], model.spec, limit)
+    def of(cls, skills: list[Skill], waypoints: Waypoints, steps_per_skill: int) -> "SkillChain":
+        """Return a chain of trained skills.
+
+        Args:
+            skills: In the order of execution.
+            waypoints: Those that they were trained along.
+            steps_per_skill: Time limit of an execution, in steps for each skill.
+        """
+        return cls(tuple(skills), waypoints.states[0], waypoints.model.spec, steps_per_skill * len(skills))
 
     def check_belongs_to(self, model: ResettableModel) -> None:
         """Raise Mismatch when the chain was trained in another environment."""
@@ -83,7 +85,15 @@ class SkillChain:
 
     def rollouts(self, model: ResettableModel, starts: Array, *, epsilon: float = 0.0,
                  rng: np.random.Generator | None = None, max_steps: int | None = None) -> Rollouts:
-        """Execute the chain from `starts` [B, D], replacing a share `epsilon` of the actions by random ones."""
+        """Execute the chain from several states side by side.
+
+        Args:
+            model: The environment.
+            starts: States [B, D].
+            epsilon: Fraction of actions that are replaced by random ones.
+            rng: Source of random actions.
+            max_steps: Time limit in steps; None for that of the chain.
+        """
         rng = rng or np.random.default_rng(0)
         limit = self.time_limit if max_steps is None else max_steps
         controller = self.controller(model, len(starts))
@@ -107,22 +117,28 @@ class SkillChain:
 
     def rollout(self, model: ResettableModel, state: Array | None = None, *, epsilon: float = 0.0,
                 rng: np.random.Generator | None = None, max_steps: int | None = None) -> Array:
-        """Return the states [T+1, D] of one execution from `state` [D], by default the chain's start."""
+        """Return the states [T+1, D] of one execution.
+
+        Args:
+            model: The environment.
+            state: Where it starts [D]; None for the chain's start.
+            epsilon, rng, max_steps: See `rollouts`.
+        """
         first = self.start if state is None else state
         return self.rollouts(model, first[None], epsilon=epsilon, rng=rng, max_steps=max_steps).states
 
     def save(self, folder: str | Path) -> None:
-        """Write chain.json (structure), chain.npz (activation sets and goals) and chain.safetensors (policies)."""
+        """Write chain.json (structure), chain.npz (activation sets and targets) and chain.safetensors (policies)."""
         folder = Path(folder)
         save_policies(folder / "chain.safetensors", [skill.policy for skill in self.skills])
         arrays = {"start": self.start}
         for index, skill in enumerate(self.skills):
-            arrays |= to_arrays(skill.activation, f"activation{index}") | to_arrays(skill.goal, f"goal{index}")
+            arrays |= to_arrays(skill.activation, f"activation{index}") | to_arrays(skill.target, f"target{index}")
         write_arrays(folder / "chain.npz", **arrays)
         write_json(folder / "chain.json", {
             "format": FORMAT, "version": VERSION, "environment": self.environment.to_dict(),
             "time_limit": self.time_limit,
-            "skills": [{"activation": kind_of(s.activation), "goal": kind_of(s.goal)} for s in self.skills]})
+            "skills": [{"activation": kind_of(s.activation), "target": kind_of(s.target)} for s in self.skills]})
 
     @classmethod
     def load(cls, folder: str | Path) -> "SkillChain":
@@ -142,7 +158,7 @@ class SkillChain:
         try:
             skills = tuple(
                 Skill(policy, from_arrays(entry["activation"], arrays, f"activation{index}"),
-                      from_arrays(entry["goal"], arrays, f"goal{index}"))
+                      from_arrays(entry["target"], arrays, f"target{index}"))
                 for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
             return cls(skills, arrays["start"], EnvSpec.from_dict(structure["environment"]), structure["time_limit"])
         except (KeyError, ValueError) as error:

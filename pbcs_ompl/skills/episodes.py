@@ -1,4 +1,4 @@
-"""Run many episodes towards one goal as one batch."""
+"""Run many episodes towards one target as one batch, with the shaped reward of [Matheron2020]."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.skills.goals import Goal
-from pbcs_ompl.skills.shaping import shaped_rewards
+from pbcs_ompl.skills.activation_sets import Target
 
 Act = Callable[[Array], Array]
 """Controls [B, A] for states [B, D]."""
@@ -21,10 +20,10 @@ class Episodes:
     """The transitions of a batch of episodes, in the order they were made.
 
     Attributes:
-        reached: Which episodes reached the goal [B].
+        reached: Which episodes reached the target [B].
         steps: The length of each episode [B].
         states, controls, rewards, next_states, terminals: The transitions, [N, ...]. A transition is terminal when
-            it reached the goal, even when that goal is local to a skill, or when the environment ended the episode.
+            it reached the target, or when the environment ended the episode.
     """
 
     reached: BoolArray
@@ -37,7 +36,7 @@ class Episodes:
 
     @property
     def success_rate(self) -> float:
-        """Share of the episodes that reached the goal."""
+        """Share of the episodes that reached the target."""
         return float(self.reached.mean())
 
     @property
@@ -46,11 +45,21 @@ class Episodes:
         return len(self.states)
 
 
-def run_episodes(model: ResettableModel, act: Act, goal: Goal, starts: Array, *, epsilon: float, max_steps: int,
-                 rng: np.random.Generator, shaped: bool = True) -> Episodes:
-    """Run one episode from each of `starts` [B, D] with an epsilon-greedy policy.
+def run_episodes(model: ResettableModel, act: Act, target: Target, starts: Array, *, epsilon: float, max_steps: int,
+                 rng: np.random.Generator, success_reward: float | None) -> Episodes:
+    """Run one episode from each start state with an epsilon-greedy policy.
 
-    Source: [Matheron2020] Alg. 8. Differs: the episodes run side by side; each ends when its goal is reached, the
+    Args:
+        model: The environment.
+        act: The policy.
+        target: Where an episode is a success.
+        starts: States [B, D].
+        epsilon: Fraction of random actions.
+        max_steps: Length at which an episode ends, in steps.
+        rng: Source of random actions.
+        success_reward: The reward for reaching the target, of the shaped reward; None for the environment's own reward.
+
+    Source: [Matheron2020] Alg. 8. Differs: the episodes run side by side; each ends when the target is reached, the
     environment terminates, or after `max_steps`.
     """
     states = starts.copy()
@@ -62,16 +71,16 @@ def run_episodes(model: ResettableModel, act: Act, goal: Goal, starts: Array, *,
         here = states[alive]
         controls = with_random_actions(model, act(here), epsilon, rng)
         outcome = model.transition(here, controls)
-        arrived = goal.contains(model, outcome.states)
-        ended = arrived | outcome.terminated
+        success = target.contains(model, outcome.states)
+        ended = success | outcome.terminated
         rewards = outcome.rewards
-        if shaped:
-            rewards = shaped_rewards(goal.distance(model, here), goal.distance(model, outcome.states), arrived,
-                                     goal.radius)
+        if success_reward is not None:
+            rewards = shaped_rewards(target.distance(model, here), target.distance(model, outcome.states), success,
+                                     target.radius, success_reward)
         parts.append((here, controls, rewards, outcome.states, ended))
         states[alive] = outcome.states
         steps[alive] += 1
-        reached[alive[arrived]] = True
+        reached[alive[success]] = True
         alive = alive[~ended]
         if not len(alive):
             break
@@ -84,3 +93,21 @@ def with_random_actions(model: ResettableModel, controls: Array, epsilon: float,
         chosen = np.flatnonzero(rng.random(len(controls)) < epsilon)
         controls[chosen] = rng.uniform(model.action_low, model.action_high, (len(chosen), controls.shape[1]))
     return controls
+
+
+def shaped_rewards(before: Array, after: Array, reached: BoolArray, radius: float, success_reward: float) -> Array:
+    """Return the shaped rewards [B]: `success_reward` where the target is reached, else Phi(s') - Phi(s).
+
+    The potential is Phi(s) = 1 / d(s, target).
+
+    Args:
+        before, after: Distances d(s, target) and d(s', target) [B].
+        reached: Whether s' lies in the target [B].
+        radius: That of the target.
+        success_reward: The reward for reaching the target.
+
+    Source: [Matheron2020] section 7.2.3. Differs: d is bounded below by the target's `radius`. Outside the target this
+    changes nothing for a ball; it keeps a step that leaves the target from an arbitrarily small distance finite.
+    """
+    gain = 1.0 / np.maximum(after, radius) - 1.0 / np.maximum(before, radius)
+    return np.where(reached, success_reward, gain)

@@ -1,34 +1,41 @@
-"""What every way of turning a plan into skills has in common."""
+"""The interface of training methods, and the checkpoints from which they resume."""
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.core.plain import plain
+from pbcs_ompl.results.files import read_arrays, write_arrays
 from pbcs_ompl.skills.chain import Skill
-from pbcs_ompl.skills.learner import Learner
+from pbcs_ompl.skills.trainer import SkillTrainer
+
+VERSION = 3
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Everything a method needs to go on: plain values, and arrays by name."""
+    """Everything a method needs to resume: plain values, and arrays by name."""
 
     plain: dict[str, Any]
     arrays: dict[str, np.ndarray]
 
 
-class Method(Protocol):
-    """A training method: small steps until it is done, each of which can be the last before a stop.
+class TrainingMethod(Protocol):
+    """Turns waypoints into skills in small steps; training can stop after each of them.
 
     Attributes:
-        learner: Who trains, and counts what it costs.
+        trainer: What trains the agent, and counts transitions and updates.
     """
 
-    learner: Learner
+    trainer: SkillTrainer
 
     @property
     def done(self) -> bool:
-        """Whether the skills lead from the start state to the target."""
+        """Whether the skills lead from the start state to the goal."""
         ...
 
     def step(self) -> None:
@@ -37,13 +44,41 @@ class Method(Protocol):
 
     @property
     def skills(self) -> list[Skill]:
-        """The skills so far, in the order of execution; the last one leads to the environment's target."""
+        """The skills so far, in the order of execution; the last one leads to the environment's goal."""
         ...
 
     @property
     def covered(self) -> float:
-        """Share of the plan that the skills so far cover, in [0, 1]."""
+        """Fraction of the plan that the skills so far cover, in [0, 1]."""
         ...
 
-    def snapshot(self) -> Snapshot: ...
-    def restore(self, snapshot: Snapshot) -> None: ...
+    def snapshot(self) -> Snapshot:
+        """Return everything needed to resume bit for bit."""
+        ...
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Resume from what `snapshot` returned."""
+        ...
+
+
+def write_checkpoint(path: Path, snapshot: Snapshot, seconds: float) -> None:
+    """Write a snapshot and the seconds of training so far, atomically."""
+    text = json.dumps({"version": VERSION, "seconds": seconds, "plain": snapshot.plain}, default=plain)
+    write_arrays(path, __plain__=np.array(text), **snapshot.arrays)
+
+
+def read_checkpoint(path: Path) -> tuple[Snapshot, float]:
+    """Return the snapshot and the seconds of training before it.
+
+    Raises:
+        DamagedFile: the file is missing, truncated, or of another version.
+    """
+    arrays = read_arrays(path)
+    try:
+        values = json.loads(str(arrays.pop("__plain__")))
+        version = values["version"]
+    except (KeyError, ValueError) as error:
+        raise DamagedFile(f"{path} is not a checkpoint: {error}") from error
+    if version != VERSION:
+        raise DamagedFile(f"{path} has version {version}, expected {VERSION}; train again from scratch")
+    return Snapshot(values["plain"], arrays), values["seconds"]

@@ -1,29 +1,64 @@
-"""PBCS: a chain of skills, each learnt by Backplay, from the target back to the start; [Matheron2020] Alg. 6."""
+"""PBCS: a chain of skills, each trained by Backplay, from the goal back to the start; [Matheron2020] Alg. 6."""
 
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from pbcs_ompl.skills.backplay import Backplay
+from pbcs_ompl.core.options import check_range
+from pbcs_ompl.skills.activation_sets import (
+    ActivationSet,
+    ClassifierSettings,
+    Target,
+    from_arrays,
+    kind_of,
+    to_arrays,
+)
+from pbcs_ompl.skills.backplay import Backplay, SkillSettings
 from pbcs_ompl.skills.chain import Skill, SkillChain
-from pbcs_ompl.skills.goals import ActivationSet, Goal
-from pbcs_ompl.skills.learner import Learner
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.policy import SkillPolicy, policy_from_arrays, policy_to_arrays
-from pbcs_ompl.skills.set_arrays import from_arrays, kind_of, to_arrays
+from pbcs_ompl.skills.settings import PlannedSettings
+from pbcs_ompl.skills.trainer import SkillTrainer
 
-VERIFIED_RATE = 0.985
-"""Share of noisy executions that must arrive for a chain to be taken as it is.
-
-Well above the 95 of 100 that count as solved: of 500 executions, a chain whose true rate is 0.97 reaches this share in
-about one case of sixty, and one whose true rate is 0.985 fails 95 of 100 in about one case of 240."""
+ACTIVATIONS = ("ball", "classifier")
 
 
-class Link(NamedTuple):
-    """A skill by the milestones between which it leads."""
+@dataclass(frozen=True)
+class PBCSSettings(PlannedSettings):
+    """Settings of the method "pbcs".
+
+    Attributes:
+        skill: How one skill is trained.
+        activation: "ball", or "classifier": the activation set of a finished skill is learnt from executions that
+            start around its start ([Matheron2020] 7.2: balls).
+        classifier: How it is learnt.
+        warm_start: A new skill starts from the networks of the skill before (ours).
+        verify_episodes: Noisy executions of the complete chain, after which PBCS trains its weakest skill again if too
+            few succeed; 0 for none ([Matheron2020]).
+        verified_rate: Success rate that they must reach (ours: well above the 95 of 100 that count as solved. Of 500
+            executions, a chain whose true rate is 0.97 reaches 0.985 in about one case of sixty, and one whose true
+            rate is 0.985 fails 95 of 100 in about one case of 240).
+    """
+
+    skill: SkillSettings = field(default_factory=SkillSettings)
+    activation: str = "ball"
+    classifier: ClassifierSettings = field(default_factory=ClassifierSettings)
+    warm_start: bool = False
+    verify_episodes: int = 0
+    verified_rate: float = 0.985
+
+    def _check_ranges(self) -> None:
+        check_range("activation", self.activation, self.activation in ACTIVATIONS, f"one of {', '.join(ACTIVATIONS)}")
+        self._check("at least 0", lambda value: value >= 0, "verify_episodes")
+        self._check_fractions("verified_rate")
+
+
+class ChainLink(NamedTuple):
+    """A skill by the waypoints between which it leads."""
 
     start: int
-    goal: int
+    end: int
     policy: SkillPolicy
     activation: ActivationSet
 
@@ -31,26 +66,27 @@ class Link(NamedTuple):
 class PBCS:
     """Plan, Backplay, Chain Skills.
 
-    Backplay learns a skill that ends at the target and starts at some milestone K; the next skill ends in the ball of
-    K, and so on until one starts at milestone 0.
+    Backplay trains a skill that ends at the goal and starts at some waypoint K; the next skill ends in the ball of K,
+    and so on until one starts at waypoint 0.
 
     Source: [Matheron2020] Alg. 6. Differs: the loop ends when a skill starts at index 0 (Alg. 7 never trains index 0,
     so that Alg. 6 would not end). With `verify_episodes`, the complete chain is executed once without random actions
-    and, if it arrives, that many times with them; when it does not, or too many executions fail, the skill in which
-    most of them got stuck is taken out and the gap is learnt anew with fresh networks.
+    and, if it succeeds, that many times with them; when it does not, or too many executions fail, the skill in which
+    most of them failed is removed and the gap is trained again with new networks.
     """
 
-    def __init__(self, learner: Learner):
-        self.learner = learner
-        self.links: list[Link] = []
-        """From the start to the target; with a gap while one is being learnt."""
-        self.verified = not learner.settings.verify_episodes
-        self._begin(learner.milestones.last, 0)
+    def __init__(self, trainer: SkillTrainer, settings: PBCSSettings):
+        self.trainer = trainer
+        self.settings = settings
+        self.links: list[ChainLink] = []
+        """From the start to the goal; with a gap while one is being trained."""
+        self.verified = not settings.verify_episodes
+        self._train_between(0, trainer.waypoints.last)
 
     @property
     def complete(self) -> bool:
-        """Whether the links lead from the start to the target without a gap."""
-        return self.goal == self.floor
+        """Whether the links lead from the start to the goal without a gap."""
+        return self.end == self.min_index
 
     @property
     def done(self) -> bool:
@@ -60,13 +96,13 @@ class PBCS:
     @property
     def skills(self) -> list[Skill]:
         """The skills so far, in the order of execution."""
-        return [Skill(link.policy, link.activation, self._goal_at(link.goal)) for link in self.links]
+        return [Skill(link.policy, link.activation, self._target_at(link.end)) for link in self.links]
 
     @property
     def covered(self) -> float:
-        """Share of the plan that the skills so far cover."""
-        learnt = self.goal - self.backplay.state.saved if self.backplay.saved_policy and not self.complete else 0
-        return (sum(link.goal - link.start for link in self.links) + learnt) / self.learner.milestones.last
+        """Fraction of the plan that the skills so far cover."""
+        trained = self.end - self.backplay.state.saved if self.backplay.saved_policy and not self.complete else 0
+        return (sum(link.end - link.start for link in self.links) + trained) / self.trainer.waypoints.last
 
     def step(self) -> None:
         """Do one session or one test of the present skill, or verify the complete chain."""
@@ -75,65 +111,70 @@ class PBCS:
             return
         self.backplay.step()
         if self.backplay.done and self.backplay.saved_policy is not None:
-            start = self.backplay.state.saved
-            activation = self.learner.activation(start, self.backplay.saved_policy)
-            self.links.append(Link(start, self.goal, self.backplay.saved_policy, activation))
+            start, policy = self.backplay.state.saved, self.backplay.saved_policy
+            self.links.append(ChainLink(start, self.end, policy, self._activation(start, policy)))
             self.links.sort(key=lambda link: link.start)
-            self._begin(start, self.floor)
+            self._train_between(self.min_index, start)
 
-    def _begin(self, goal: int, floor: int) -> None:
-        """Learn the way from milestone `floor` to milestone `goal`, unless there is nothing left of it."""
-        self.goal, self.floor = goal, floor
+    def _train_between(self, min_index: int, end: int) -> None:
+        """Train from waypoint `min_index` to waypoint `end` next, unless there is nothing left between them."""
+        self.min_index, self.end = min_index, end
         if not self.complete:
-            self.learner.begin(goal, self._goal_at(goal))
-        self.backplay = Backplay(self.learner, floor)
+            self.trainer.start_skill(end, self._target_at(end), warm_start=self.settings.warm_start)
+        self.backplay = Backplay(self.trainer, self.settings.skill, min_index)
 
-    def _goal_at(self, index: int) -> Goal:
-        """Return what a skill that ends at milestone `index` aims at: the activation set of the skill from there on."""
-        sets: dict[int, Goal] = {link.start: link.activation for link in self.links}
-        return sets.get(index, self.learner.milestones.goal(index))
+    def _activation(self, start: int, policy: SkillPolicy) -> ActivationSet:
+        """Return where the finished skill may start; nothing is learnt for the first skill of a chain."""
+        if self.settings.activation == "ball" or start == 0:
+            return self.trainer.waypoints.ball(start)
+        return self.trainer.learn_activation(start, policy, self.settings.classifier)
+
+    def _target_at(self, index: int) -> Target:
+        """Return where a skill that ends at waypoint `index` leads: the activation set of the skill from there on."""
+        sets: dict[int, Target] = {link.start: link.activation for link in self.links}
+        return sets.get(index, self.trainer.waypoints.target(index))
 
     def _verify(self) -> None:
-        learner = self.learner
-        chain = SkillChain.of(self.skills, learner.milestones)
-        starts = np.repeat(learner.milestones.states[:1], learner.settings.verify_episodes, axis=0)
-        tried = chain.rollouts(learner.model, starts[:1])
-        learner.counter.count += int(tried.steps.sum())
+        trainer, settings = self.trainer, self.settings
+        chain = SkillChain.of(self.skills, trainer.waypoints, settings.steps_per_skill)
+        starts = np.repeat(trainer.waypoints.states[:1], settings.verify_episodes, axis=0)
+        tried = chain.rollouts(trainer.model, starts[:1])
+        trainer.counter.count += int(tried.steps.sum())
         if tried.success.all():
-            tried = chain.rollouts(learner.model, starts, epsilon=learner.settings.epsilon, rng=learner.rng)
-            learner.counter.count += int(tried.steps.sum())
-        self.verified = bool(tried.success.mean() >= VERIFIED_RATE)
+            tried = chain.rollouts(trainer.model, starts, epsilon=settings.episodes.epsilon, rng=trainer.rng)
+            trainer.counter.count += int(tried.steps.sum())
+        self.verified = bool(tried.success.mean() >= settings.verified_rate)
         if not self.verified:
             weakest = self.links.pop(int(np.bincount(tried.skills[~tried.success]).argmax()))
-            learner.restart()
-            self._begin(weakest.goal, weakest.start)
+            trainer.restart()
+            self._train_between(weakest.start, weakest.end)
 
     def snapshot(self) -> Snapshot:
-        """Return everything needed to go on bit for bit."""
-        plain, arrays = self.learner.state()
+        """Return everything needed to resume bit for bit."""
+        plain, arrays = self.trainer.state()
         saved = self.backplay.saved_policy
         policies = [link.policy for link in self.links] + ([saved] if saved else [])
         for index, policy in enumerate(policies):
             arrays |= {f"policy{index}.{name}": array for name, array in policy_to_arrays(policy).items()}
         for index, link in enumerate(self.links):
             arrays |= to_arrays(link.activation, f"activation{index}")
-        return Snapshot({"learner": plain,
-                         "links": [[link.start, link.goal, kind_of(link.activation)] for link in self.links],
-                         "goal": self.goal, "floor": self.floor, "verified": self.verified,
+        return Snapshot({"trainer": plain,
+                         "links": [[link.start, link.end, kind_of(link.activation)] for link in self.links],
+                         "end": self.end, "min_index": self.min_index, "verified": self.verified,
                          "backplay": self.backplay.to_dict(), "policies": len(policies)}, arrays)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go on from what `snapshot` returned."""
+        """Resume from what `snapshot` returned."""
         plain = snapshot.plain
         policies = [policy_from_arrays({name.partition(".")[2]: array for name, array in snapshot.arrays.items()
                                         if name.startswith(f"policy{index}.")})
                     for index in range(plain["policies"])]
-        self.links = [Link(start, goal, policies[index], from_arrays(kind, snapshot.arrays, f"activation{index}"))
-                      for index, (start, goal, kind) in enumerate(plain["links"])]
-        self.goal, self.floor, self.verified = plain["goal"], plain["floor"], plain["verified"]
-        self.learner.restore(plain["learner"], {name: array for name, array in snapshot.arrays.items()
+        self.links = [ChainLink(start, end, policies[index], from_arrays(kind, snapshot.arrays, f"activation{index}"))
+                      for index, (start, end, kind) in enumerate(plain["links"])]
+        self.end, self.min_index, self.verified = plain["end"], plain["min_index"], plain["verified"]
+        self.trainer.restore(plain["trainer"], {name: array for name, array in snapshot.arrays.items()
                                                 if not name.startswith(("policy", "activation"))})
-        self.learner.aim(self.learner.goal_index, self._goal_at(self.learner.goal_index))
-        self.backplay = Backplay(self.learner, self.floor)
+        self.trainer.set_target(self.trainer.end_index, self._target_at(self.trainer.end_index))
+        self.backplay = Backplay(self.trainer, self.settings.skill, self.min_index)
         self.backplay.restore(plain["backplay"],
                               policies[len(self.links)] if len(policies) > len(self.links) else None)

@@ -1,5 +1,6 @@
-"""The policy of one skill: an actor that may see the world relative to its goal."""
+"""The policy of one skill: an actor, and how it observes the world."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,60 +11,63 @@ from pbcs_ompl.core.errors import DamagedFile, MissingDependency
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.results.files import write_atomically
 
-HORIZON = 10
-"""Relative observations are measured in the movement of this many steps, so that they are of order one nearby."""
-
 
 @dataclass(frozen=True, eq=False)
-class Frame:
-    """Where the observations of a skill are measured from, and in which unit: (o - origin) / scale, [O] each."""
+class ObservationTransform:
+    """What a policy sees of observations: (o - origin) / scale, with origin and scale [O]."""
 
     origin: Array
     scale: Array
 
     def __call__(self, observations: Array) -> Array:
-        """Return observations [B, O] in this frame."""
+        """Return the transformed observations [B, O]."""
         return (observations - self.origin) / self.scale
 
     @classmethod
-    def plain(cls, size: int) -> "Frame":
-        """Return the frame that changes nothing."""
+    def identity(cls, size: int) -> "ObservationTransform":
+        """Return the transform that changes nothing."""
         return cls(np.zeros(size), np.ones(size))
 
     @classmethod
-    def around(cls, origin: Array, observations: Array) -> "Frame":
-        """Return the frame around `origin` [O], in units of the movement along a plan's `observations` [T+1, O]."""
+    def relative(cls, origin: Array, observations: Array, horizon: int) -> "ObservationTransform":
+        """Return the transform to observations relative to a goal.
+
+        Args:
+            origin: The observation of the goal [O].
+            observations: Those along a plan [T+1, O]; the largest movement in a step is the unit.
+            horizon: Number of such steps that have the length 1.
+        """
         largest = np.abs(np.diff(observations, axis=0)).max(axis=0)
-        return cls(origin, np.where(largest > 0, HORIZON * largest, 1.0))
+        return cls(origin, np.where(largest > 0, horizon * largest, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
 class SkillPolicy:
-    """An immutable actor and the frame it was trained in."""
+    """An immutable actor and the transform it was trained with."""
 
     actor: Policy
-    frame: Frame
+    transform: ObservationTransform
 
     def act(self, observations: Array) -> Array:
         """Return the actions [B, A] for plain observations [B, O]."""
-        return self.actor.act(self.frame(observations))
+        return self.actor.act(self.transform(observations))
 
 
 def policy_to_arrays(policy: SkillPolicy) -> dict[str, np.ndarray]:
     """Return a policy as named arrays."""
-    return policy.actor.to_arrays() | {"origin": policy.frame.origin, "scale": policy.frame.scale}
+    return policy.actor.to_arrays() | {"origin": policy.transform.origin, "scale": policy.transform.scale}
 
 
 def policy_from_arrays(arrays: dict[str, np.ndarray]) -> SkillPolicy:
     """Return the policy of `policy_to_arrays`.
 
     Raises:
-        KeyError: an array of the frame is missing.
+        KeyError: an array of the transform is missing.
         DamagedFile: arrays of the actor are missing or do not fit.
     """
     return SkillPolicy(Policy.from_arrays({name: array for name, array in arrays.items()
                                            if name not in ("origin", "scale")}),
-                       Frame(arrays["origin"], arrays["scale"]))
+                       ObservationTransform(arrays["origin"], arrays["scale"]))
 
 
 def save_policies(path: Path, policies: list[SkillPolicy]) -> None:
@@ -96,7 +100,8 @@ def load_policies(path: Path, count: int) -> list[SkillPolicy]:
         raise DamagedFile(f"{path} is damaged: it lacks {error}") from error
 
 
-def _safetensors():  # type: ignore[no-untyped-def]  # the two functions of a library without types
+def _safetensors() -> tuple[Callable[..., bytes], Callable[..., dict[str, np.ndarray]]]:
+    """Return the functions that write and read tensors."""
     try:
         from safetensors.numpy import load, save
     except ModuleNotFoundError as error:

@@ -1,122 +1,246 @@
-"""What can be set in skill training, and the named presets."""
+"""Settings of training methods: the groups that methods share, and presets, one TOML file for each.
+
+Each method adds its own settings in a subclass of `MethodSettings` beside its code. Defaults are those of
+[Matheron2020]. A preset's table [common] holds for all methods, those that are called like a method for that one.
+"""
 
 import tomllib
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Any, Self
 
-from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
-
-ACTIVATIONS = ("ball", "classifier")
+from pbcs_ompl.core.errors import InvalidOption, UnknownName
+from pbcs_ompl.core.options import check_names, check_range, check_types
 
 
 @dataclass(frozen=True)
-class SkillSettings:
-    """Settings of Backplay in all its forms.
+class Settings:
+    """A frozen dataclass of plain values, and of groups: other `Settings`, one level deep.
 
-    Attributes:
-        alpha: Sessions without improvement after which training has stabilised (Alg. 7).
-        beta: Episodes of a session and of a test (Alg. 7 and 8).
-        radius: Radius of start balls, activation sets and local goals: the thesis's epsilon of section 7.2.
-        activation: "ball", or "classifier": the activation set of a finished skill is learnt from what came of it in
-            states around its start.
-        epsilon: Share of random actions while collecting experience.
-        test_epsilon: Share of random actions in tests; 0 in the thesis.
-        max_steps: Longest episode of a skill.
-        updates_per_transition: Gradient steps for each collected transition.
-        episodes_together: Episodes that run as one batch between updates; 1 is the thesis's order.
-        shaped: Train on the shaped reward instead of the environment's own.
-        stop_at_success: Leave a training loop at 100 % instead of waiting for alpha sessions without improvement.
-        keep_partial: Move on when a start point is only partly solved, as Alg. 7 does; else end the skill there.
-        reject_invalid: Draw again when a start state is invalid; the literal rule keeps it.
-        shorten: Erase detours of the plan first.
-        rehearsal: Share of training episodes that start from a random point already passed.
-        min_stride, max_stride: Steps along the plan between start points; the stride doubles while tests pass.
-        relative_observations: Policies see (observation - goal's observation) / ten steps' movement.
-        warm_start: A new skill starts from the networks of the one before.
-        verify_episodes: Executions of the complete chain after which PBCS learns its weakest skill anew, if need be; 0
-            for none, as in the thesis.
-        window: Share of the plan that one window of the original Backplay spans.
-        window_sessions: Sessions the original Backplay stays in one window.
-        pretest: PB tests a new start point before training there (Fig. 5.1b).
-        explored: Transitions of Ex that "bootstrapped" and "offline" begin with (section 4.4).
+    Raises:
+        InvalidOption: a value of another type than its default, or out of its range.
     """
 
-    alpha: int = 10
+    def __post_init__(self) -> None:
+        types = {name: type(default) for name, default in self.defaults().items()}
+        check_types({name: getattr(self, name) for name in types}, types)
+        self._check_ranges()
+
+    def _check_ranges(self) -> None:
+        """Refuse values out of their range."""
+
+    def _check(self, expected: str, holds: Callable[[Any], bool], *names: str) -> None:
+        for name in names:
+            check_range(name, getattr(self, name), holds(getattr(self, name)), expected)
+
+    def _check_counts(self, *names: str) -> None:
+        self._check("at least 1", lambda value: value >= 1, *names)
+
+    def _check_fractions(self, *names: str) -> None:
+        self._check("within [0, 1]", lambda value: 0 <= value <= 1, *names)
+
+    def _check_positive(self, *names: str) -> None:
+        self._check("greater than 0", lambda value: value > 0, *names)
+
+    @classmethod
+    def defaults(cls) -> dict[str, Any]:
+        """Return the default of each value and group."""
+        return {part.name: part.default if part.default_factory is MISSING else part.default_factory()
+                for part in fields(cls)}
+
+    @classmethod
+    def paths(cls) -> dict[str, str]:
+        """Return the path of each setting under its name and under its path: "epsilon" is "episodes.epsilon"."""
+        found: dict[str, str] = {}
+        for name, default in cls.defaults().items():
+            if isinstance(default, Settings):
+                inner = {leaf: f"{name}.{leaf}" for leaf in default.paths()}
+                found |= inner | {path: path for path in inner.values()}
+            else:
+                found[name] = name
+        return found
+
+    def updated(self, changes: Mapping[str, Any]) -> Self:
+        """Return a copy with some settings replaced.
+
+        Args:
+            changes: New values by name ("epsilon"), by path ("episodes.epsilon"), or as tables of groups.
+
+        Raises:
+            InvalidOption: an unknown name, or a value of the wrong type or out of its range.
+        """
+        flat, paths = flat_names(changes), self.paths()
+        check_names(type(self).__name__, "setting", flat, paths)
+        own: dict[str, Any] = {}
+        groups: dict[str, dict[str, Any]] = {}
+        for name, value in flat.items():
+            group, _, leaf = paths[name].rpartition(".")
+            (groups.setdefault(group, {}) if group else own)[leaf] = value
+        return replace(self, **own, **{group: replace(getattr(self, group), **values)
+                                       for group, values in groups.items()})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all settings by name, groups as tables; see `from_dict`."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Return the settings of `to_dict()`.
+
+        Raises:
+            InvalidOption: an unknown or a missing setting, or a value of the wrong type or out of its range.
+        """
+        defaults = cls.defaults()
+        check_names(cls.__name__, "setting", values, defaults)
+        missing = [name for name in defaults if name not in values]
+        if missing:
+            raise InvalidOption(f"{cls.__name__} lacks the setting {missing[0]!r}; expected {', '.join(defaults)}")
+        tables = {name: default for name, default in defaults.items() if isinstance(default, Settings)}
+        check_types({name: values[name] for name in tables}, dict.fromkeys(tables, dict))
+        return cls(**dict(values) | {name: type(group).from_dict(values[name]) for name, group in tables.items()})
+
+
+def flat_names(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return changes without tables: {"episodes": {"epsilon": 0.2}} is {"episodes.epsilon": 0.2}."""
+    flat: dict[str, Any] = {}
+    for name, value in changes.items():
+        flat |= {f"{name}.{leaf}": inner for leaf, inner in value.items()} if isinstance(value, Mapping) else {
+            name: value}
+    return flat
+
+
+@dataclass(frozen=True)
+class EpisodeSettings(Settings):
+    """How experience is collected, rewarded, learnt from and tested.
+
+    Attributes:
+        beta: Episodes of a session and of a test ([Matheron2020] Alg. 7 and 8; 50 in chapter 7).
+        epsilon: Fraction of random actions while collecting experience ([Matheron2020] chapter 7).
+        test_epsilon: Fraction of random actions in tests ([Matheron2020]: 0).
+        max_steps: Longest episode of a skill, in steps ([Matheron2020] chapter 7).
+        updates_per_transition: Gradient steps for each collected transition ([Matheron2020] Alg. 8).
+        episodes_per_batch: Episodes that run side by side between updates ([Matheron2020] Alg. 8: 1).
+        shaped: Train on the shaped reward ([Matheron2020] 7.2.3) instead of the environment's own.
+        success_reward: The shaped reward for reaching the goal ([Matheron2020] 7.2.3).
+    """
+
     beta: int = 50
-    radius: float = 0.1
-    activation: str = "ball"
     epsilon: float = 0.1
     test_epsilon: float = 0.0
     max_steps: int = 50
     updates_per_transition: float = 1.0
-    episodes_together: int = 1
+    episodes_per_batch: int = 1
     shaped: bool = True
-    stop_at_success: bool = True
-    keep_partial: bool = True
+    success_reward: float = 10.0
+
+    def _check_ranges(self) -> None:
+        self._check_counts("beta", "max_steps", "episodes_per_batch")
+        self._check_fractions("epsilon", "test_epsilon")
+        self._check_positive("updates_per_transition")
+
+
+@dataclass(frozen=True)
+class StartSettings(Settings):
+    """Where episodes start: in a ball around a state.
+
+    Attributes:
+        radius: Radius of start balls, activation sets and local goals, in the environment's distance (epsilon of
+            [Matheron2020] 7.2).
+        reject_invalid: Draw again when a start state is invalid; [Matheron2020] keeps it.
+        rollout_steps: Longest random rollout that draws a start state, in simulators where a vector near a state need
+            not be a state (ours, not tuned).
+    """
+
+    radius: float = 0.1
     reject_invalid: bool = True
-    shorten: bool = False
-    rehearsal: float = 0.0
-    min_stride: int = 1
-    max_stride: int = 1
+    rollout_steps: int = 5
+
+    def _check_ranges(self) -> None:
+        self._check_positive("radius")
+        self._check_counts("rollout_steps")
+
+
+@dataclass(frozen=True)
+class PlanSettings(Settings):
+    """How a plan becomes waypoints, and how policies observe the world along it.
+
+    Attributes:
+        remove_loops: Erase loops of the plan first (ours).
+        relative_observations: Policies observe (o - o_goal) / scale, see `ObservationTransform` (ours).
+        observation_horizon: The scale of relative observations is the largest movement in one step of the plan times
+            this number of steps (ours, not tuned: observations near the goal are of order one).
+        preceding_waypoints: Waypoints before a start point from which random rollouts may begin (ours: as many as
+            `rollout_steps`; with 0, training stalls at 52 % of a plan of Ex on MountainCarContinuous-v0, seed 0).
+    """
+
+    remove_loops: bool = False
     relative_observations: bool = False
-    warm_start: bool = False
-    verify_episodes: int = 0
-    window: float = 0.1
-    window_sessions: int = 10
-    pretest: bool = True
-    explored: int = 10_000
+    observation_horizon: int = 10
+    preceding_waypoints: int = 5
 
-    def __post_init__(self) -> None:
-        for name in ("alpha", "beta", "max_steps", "episodes_together", "min_stride", "max_stride",
-                     "window_sessions", "explored"):
-            self._require(name, getattr(self, name) >= 1, "at least 1")
-        self._require("activation", self.activation in ACTIVATIONS, f"one of {', '.join(ACTIVATIONS)}")
-        self._require("verify_episodes", self.verify_episodes >= 0, "at least 0")
-        for name in ("epsilon", "test_epsilon", "rehearsal"):
-            self._require(name, 0 <= getattr(self, name) <= 1, "within [0, 1]")
-        for name in ("radius", "updates_per_transition", "window"):
-            self._require(name, getattr(self, name) > 0, "greater than 0")
-        self._require("max_stride", self.max_stride >= self.min_stride, f"at least min_stride = {self.min_stride}")
+    def _check_ranges(self) -> None:
+        self._check_counts("observation_horizon")
+        self._check("at least 0", lambda value: value >= 0, "preceding_waypoints")
 
-    def _require(self, name: str, holds: bool, expected: str) -> None:
-        if not holds:
-            raise InvalidOption(f"{name} = {getattr(self, name)!r}, expected {expected}")
 
-    def updated(self, changes: dict[str, Any]) -> "SkillSettings":
-        """Return a copy with some settings replaced.
+@dataclass(frozen=True)
+class CriterionSettings(Settings):
+    """When a training counts as solved, and how long an execution may take.
 
-        Raises:
-            InvalidOption: a name that does not exist (the closest is suggested), or a value of the wrong kind.
-        """
-        known = {field.name: type(getattr(self, field.name)) for field in fields(self)}
-        for name, value in changes.items():
-            if name not in known:
-                raise InvalidOption(f"unknown skill setting {name!r}{did_you_mean(name, known)}")
-            wanted = known[name]
-            if not isinstance(value, int | float if wanted is float else wanted) or (
-                    isinstance(value, bool) and wanted is not bool):
-                raise InvalidOption(f"{name} = {value!r}, expected {wanted.__name__}")
-        return replace(self, **changes)
+    Attributes:
+        robust_epsilon: Fraction of random actions in the noisy executions (ours: that of [Matheron2020] in training).
+        robust_rate: Success rate that they must reach (ours, by definition).
+        robust_episodes: Their number (ours: the Wilson interval of 95 of 100 is 89 % to 98 %).
+        time_limit_factor: An execution fails after this factor times `max_steps` times the number of skills (ours, not
+            tuned).
+    """
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the settings as plain values."""
-        return asdict(self)
+    robust_epsilon: float = 0.1
+    robust_rate: float = 0.95
+    robust_episodes: int = 100
+    time_limit_factor: int = 2
+
+    def _check_ranges(self) -> None:
+        self._check_fractions("robust_epsilon", "robust_rate")
+        self._check_counts("robust_episodes", "time_limit_factor")
+
+
+@dataclass(frozen=True)
+class MethodSettings(Settings):
+    """What can be set in every training method."""
+
+    episodes: EpisodeSettings = field(default_factory=EpisodeSettings)
+    starts: StartSettings = field(default_factory=StartSettings)
+    criterion: CriterionSettings = field(default_factory=CriterionSettings)
+
+    @property
+    def steps_per_skill(self) -> int:
+        """Time limit of an execution, in steps for each skill."""
+        return self.criterion.time_limit_factor * self.episodes.max_steps
+
+
+@dataclass(frozen=True)
+class PlannedSettings(MethodSettings):
+    """What can be set in every method that trains along a plan."""
+
+    plan: PlanSettings = field(default_factory=PlanSettings)
+
+
+def preset_names() -> list[str]:
+    """Return the names of all presets, sorted."""
+    return sorted(entry.name.removesuffix(".toml") for entry in files("pbcs_ompl.skills").iterdir()
+                  if entry.name.endswith(".toml"))
 
 
 @cache
-def _presets() -> dict[str, dict[str, Any]]:
-    return tomllib.loads(files("pbcs_ompl.skills").joinpath("presets.toml").read_text())
-
-
-def skill_preset(name: str, method: str = "pbcs") -> SkillSettings:
-    """Return the settings that a named preset has for a method.
+def read_preset(name: str) -> dict[str, Any]:
+    """Return the tables of a preset and its "version", which grows whenever one of its values changes.
 
     Raises:
-        UnknownName: no such preset.
+        UnknownName: no such preset; the message suggests the closest one.
     """
-    if name not in _presets():
-        raise UnknownName("preset", name, _presets())
-    table = _presets()[name]
-    return SkillSettings().updated(table["skills"] | table.get(method, {}))
+    if name not in preset_names():
+        raise UnknownName("preset", name, preset_names())
+    return tomllib.loads(files("pbcs_ompl.skills").joinpath(f"{name}.toml").read_text())

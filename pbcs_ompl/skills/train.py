@@ -1,5 +1,7 @@
 """From an environment to a trained skill chain."""
 
+import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import DamagedFile, InvalidOption, RunFolderError, TrainingStalled, UnknownName
+from pbcs_ompl.core.errors import RunFolderError
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.types import Counter, ProgressCallback
@@ -17,74 +19,89 @@ from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.files import CHECKPOINT, CONFIG, RESULT, read_toml
 from pbcs_ompl.results.folder import RunFolder
-from pbcs_ompl.skills.config import TrainConfig
-from pbcs_ompl.skills.result import TrainResult
-from pbcs_ompl.skills.training import Training
+from pbcs_ompl.skills.config import TrainConfig, read_config
+from pbcs_ompl.skills.training import Training, TrainResult, training_versions
 
 
-def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, env_kwargs: dict[str, Any] | None = None,
+def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: Trajectory | None = None,
+          method: str = "pbcs", agent: str = "ddpg", preset: str = "fast", settings: dict[str, Any] | None = None,
+          agent_settings: dict[str, Any] | None = None, planner: str | None = None,
+          planner_kwargs: dict[str, Any] | None = None, env_kwargs: dict[str, Any] | None = None,
           goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
-          trajectory: Trajectory | None = None, out: str | Path | None = None,
-          on_progress: ProgressCallback | None = None, **options: Any) -> TrainResult:
+          seed: int = 0, max_transitions: int = 10_000_000, device: str = "cpu", out: str | Path | None = None,
+          on_progress: ProgressCallback | None = None) -> TrainResult:
     """Plan (unless a trajectory is given) and train skills along the plan.
 
     Args:
         env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model.
+        trajectory: A plan made before.
+        method: "pbcs", "pb", "backplay", "plain", "bootstrapped" or "offline".
+        agent: A registered agent, or module:Class.
+        preset: Named settings of the method and of the agent: "fast" or "thesis".
+        settings: Settings of the method that differ from the preset, by name ({"epsilon": 0.2}), by path
+            ({"episodes.epsilon": 0.2}) or as tables.
+        agent_settings: Settings of the agent that differ from the preset.
+        planner: A registered planner, or module:attribute; None for Ex, or where nothing is planned.
+        planner_kwargs: Options of the planner.
         env_kwargs: Options of the environment, when `env` is an id.
         goal, feature, start_seed: See `pbcs_ompl.make`.
-        trajectory: A plan made before.
+        seed: Root of all random streams; equal seeds give equal results.
+        max_transitions: Budget of environment steps, planning included.
+        device: Where the agent trains, "cpu" or "cuda".
         out: A new folder for config.toml, result.json, trajectory.npz, chain/ and, until the end, checkpoint.npz.
         on_progress: Called after every session and test with plain numbers.
-        options: The fields of `TrainConfig`: method, planner, planner_kwargs, agent, preset, settings, agent_settings,
-            seed, max_transitions, device.
+
+    Returns:
+        The result. When it is not solved, `reason` says why.
 
     Raises:
         UnknownName, InvalidOption: no such method, planner, agent, preset or setting; values out of range; a planner
-            beside a trajectory.
+            or a trajectory that would not be used.
         NotResettable, UnsupportedSpace: the environment does not fit.
         Mismatch: the trajectory belongs to another environment, or does not reach its goal.
         RunFolderError: the folder exists, is in use, or cannot be written.
         CallbackFailed: the environment raised, or returned NaN.
-        TrainingStalled: the budget ended first; its `result` holds what was learnt so far.
     """
-    config = _config(options)
+    config = TrainConfig.resolve(
+        method=method, planner=planner, planner_kwargs=planner_kwargs, agent=agent, preset=preset, settings=settings,
+        agent_settings=agent_settings, seed=seed, max_transitions=max_transitions, device=device,
+        planned=trajectory is not None)
     model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
     if trajectory is not None:
-        if config.chooses_planner:
-            raise InvalidOption("a trajectory is given, so nothing is planned; remove planner and planner_kwargs")
         trajectory.check_belongs_to(model)
-    elif config.chooses_planner:
+    if planner is not None or planner_kwargs:
         _check_planner(model, config)
     if out is None:
-        return _checked(Training(model, config, None, on_progress, False).run(trajectory))
+        return Training(model, config, None, on_progress, False).run(trajectory)
     with RunFolder(out) as folder:
-        return _checked(Training(model, config, folder, on_progress, False).run(trajectory))
+        return Training(model, config, folder, on_progress, False).run(trajectory)
 
 
 def resume(folder: str | Path, *, max_transitions: int | None = None,
            on_progress: ProgressCallback | None = None) -> TrainResult:
-    """Go on with an interrupted training; the result is that of an uninterrupted one, bit for bit.
+    """Continue an interrupted training; the result is that of an uninterrupted one, bit for bit.
+
+    Every setting is what the folder holds; presets are not read again. Where packages have other versions than those
+    that the training began with, a warning names them.
 
     Args:
         folder: The `out` of the training.
         max_transitions: A new budget, for a training that has used up its own.
+        on_progress: Called after every session and test with plain numbers.
 
     Raises:
-        RunFolderError: there is nothing to resume, or another process is at it.
+        RunFolderError: there is nothing to resume, or another process uses the folder.
         DamagedFile: a file in the folder is damaged.
     """
     with RunFolder(folder, resume=True) as opened:
         if (opened.path / RESULT).is_file() and not (opened.path / CHECKPOINT).is_file():
             raise RunFolderError(f"the training in {opened.path} has ended; there is nothing to resume")
-        values = read_toml(opened.path / CONFIG) | ({"max_transitions": max_transitions} if max_transitions else {})
-        try:
-            others = {name: values[name] for name in values.keys() - {"kind", "environment", "versions"}}
-            environment, config = EnvSpec.from_dict(values["environment"]), TrainConfig(**others)
-        except (KeyError, TypeError) as error:
-            raise DamagedFile(f"{opened.path / CONFIG} is not the configuration of a training: {error}") from error
-        if max_transitions:
-            opened.write_config(values)
-        return _checked(Training(make(environment), config, opened, on_progress, True).run(None))
+        environment, config, versions = read_config(opened.path / CONFIG)
+        _warn_of_other_versions(opened.path, versions)
+        if max_transitions is not None:
+            config = replace(config, max_transitions=max_transitions)
+            opened.write_config(read_toml(opened.path / CONFIG) | {"max_transitions": max_transitions})
+        return Training(make(environment), config, opened, on_progress, True).run(None)
 
 
 def _check_planner(model: ResettableModel, config: TrainConfig) -> None:
@@ -93,15 +110,10 @@ def _check_planner(model: ResettableModel, config: TrainConfig) -> None:
         PlannerSpec(config.planner, config.planner_kwargs).build(problem.space_information, config.seed)
 
 
-def _checked(result: TrainResult) -> TrainResult:
-    if result.stalled:
-        raise TrainingStalled(result.stalled, result)
-    return result
-
-
-def _config(options: dict[str, Any]) -> TrainConfig:
-    known = TrainConfig.__dataclass_fields__
-    for name in options:
-        if name not in known:
-            raise UnknownName("option of train", name, known)
-    return TrainConfig(**options)
+def _warn_of_other_versions(path: Path, before: dict[str, str]) -> None:
+    now = training_versions()
+    changed = [f"{name} {before.get(name, 'missing')} (now {now.get(name, 'missing')})"
+               for name in sorted(before.keys() | now.keys()) if before.get(name) != now.get(name)]
+    if changed:
+        warnings.warn(f"{path} was begun with other versions, so the result may differ from that of an uninterrupted "
+                      f"training: {', '.join(changed)}", stacklevel=3)

@@ -10,7 +10,7 @@ from pbcs_ompl.agents import DDPG, StackedAgent
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.skills.agent_door import load_agent
+from pbcs_ompl.skills.agent_interface import load_agent
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The example of a third-party agent obeys `pbcs_ompl.skills.agent_door`."""
+"""The example of a third-party agent obeys `pbcs_ompl.skills.agent_interface`."""
 
 import sys
 from pathlib import Path
@@ -10,7 +10,7 @@ pytest.importorskip("stable_baselines3")
 
 from pbcs_ompl.agents import TD3Settings
 from pbcs_ompl.core.errors import InvalidOption, PbcsError, UnknownName
-from pbcs_ompl.skills.agent_door import load_agent
+from pbcs_ompl.skills.agent_interface import load_agent
 
 LOW, HIGH = np.array([-1.0, 0.0]), np.array([0.5, 10.0])
 

@@ -12,7 +12,6 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from statistics import median
 
-from pbcs_ompl.core.errors import TrainingStalled
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.skills import train
 
@@ -23,11 +22,7 @@ BUDGET = 10_000_000
 def run(size: int, seed: int, method: str, preset: str, budget: int) -> dict:
     """Train once and return the summary."""
     kwargs = {"size": size} if size < 4 else {"size": size, "maze_seed": seed}
-    try:
-        result = train("pbcs/Maze-v0", env_kwargs=kwargs, method=method, preset=preset, seed=seed,
-                       max_transitions=budget)
-    except TrainingStalled as stalled:
-        result = stalled.result
+    result = train("pbcs/Maze-v0", env_kwargs=kwargs, method=method, preset=preset, seed=seed, max_transitions=budget)
     return result.summary() | {"size": size}
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.types import Array, BoolArray, Transition
+from pbcs_ompl.core.types import Array, BoolArray, Counter, Transition
 
 
 class Square:
@@ -66,7 +66,8 @@ class Square:
         return np.linalg.norm(self.feature(states) - np.atleast_2d(others)[:, self.where], axis=1)
 
     def perturb(self, state: Array, radius: float, count: int, rng: np.random.Generator, *,
-                reject_invalid: bool = True) -> Array:
+                reject_invalid: bool = True, before: Array | None = None, rollout_steps: int = 5,
+                counter: Counter | None = None) -> Array:
         return np.repeat(state[None], count, axis=0)
 
     def advance_towards(self, states: Array, targets: Array) -> Array:

@@ -2,16 +2,18 @@
 
 import json
 
+import gymnasium
 import numpy as np
 import pytest
 
 from pbcs_ompl.agents.policy import Policy
-from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
+from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch, UnknownName
 from pbcs_ompl.resettable import make
+from pbcs_ompl.skills.activation_sets import Ball, EnvironmentGoal
 from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.evaluation import evaluate
-from pbcs_ompl.skills.goals import Ball, Target
-from pbcs_ompl.skills.policy import Frame, SkillPolicy
+from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
 
 MODEL = make("pbcs/Maze-v0", {"size": 2})
 TURNS = [[0.5, 0.5], [1.5, 0.5], [1.5, 1.5]]
@@ -21,14 +23,14 @@ ENDS = [*TURNS[1:], [0.5, 1.5]]
 def towards(point):
     """A policy that walks straight to `point`: one linear layer and the tanh."""
     actor = Policy(((-4 * np.eye(2, dtype=np.float32), np.zeros(2, np.float32)),), MODEL.action_low, MODEL.action_high)
-    return SkillPolicy(actor, Frame(np.array(point), np.ones(2)))
+    return SkillPolicy(actor, ObservationTransform(np.array(point), np.ones(2)))
 
 
 def round_the_corner():
     """The hand-made chain of the 2x2 maze: right, up, left."""
-    goals = [Ball(np.array(ENDS[0]), 0.15), Ball(np.array(ENDS[1]), 0.15), Target(MODEL.goal_threshold)]
-    skills = tuple(Skill(towards(end), Ball(np.array(start), 0.15), goal)
-                   for start, end, goal in zip(TURNS, ENDS, goals, strict=True))
+    targets = [Ball(np.array(ENDS[0]), 0.15), Ball(np.array(ENDS[1]), 0.15), EnvironmentGoal(MODEL.goal_threshold)]
+    skills = tuple(Skill(towards(end), Ball(np.array(start), 0.15), target)
+                   for start, end, target in zip(TURNS, ENDS, targets, strict=True))
     return SkillChain(skills, np.array(TURNS[0]), MODEL.spec, 200)
 
 
@@ -67,11 +69,11 @@ def test_saving_and_loading_changes_nothing(tmp_path):
     chain = round_the_corner()
     chain.save(tmp_path / "chain")
     loaded = SkillChain.load(tmp_path / "chain")
-    assert (loaded.env_id, loaded.env_kwargs, loaded.time_limit) == (chain.env_id, chain.env_kwargs, chain.time_limit)
+    assert (loaded.environment, loaded.time_limit) == (chain.environment, chain.time_limit)
     for mine, theirs in zip(chain.skills, loaded.skills, strict=True):
         np.testing.assert_array_equal(mine.activation.center, theirs.activation.center)
-        assert type(mine.goal) is type(theirs.goal)
-        assert mine.goal.radius == theirs.goal.radius
+        assert type(mine.target) is type(theirs.target)
+        assert mine.target.radius == theirs.target.radius
     starts = np.random.default_rng(0).uniform(0.3, 0.7, (5, 2))
     rng = np.random.default_rng
     np.testing.assert_array_equal(chain.rollouts(MODEL, starts, epsilon=0.3, rng=rng(1)).states,
@@ -111,3 +113,24 @@ def test_evaluation_counts_and_bounds():
         evaluate(round_the_corner(), MODEL, epsilon=1.2)
     with pytest.raises(Mismatch, match="trained in"):
         evaluate(round_the_corner(), make("pbcs/Maze-v0", {"size": 3}))
+
+
+@pytest.mark.parametrize(("env", "options"), [
+    (None, {}), ("pbcs/Maze-v0", {"env_kwargs": {"size": 2}}), (EnvSpec("pbcs/Maze-v0", {"size": 2}), {}),
+    (gymnasium.make("pbcs/Maze-v0", size=2), {}), (MODEL, {})])
+def test_an_environment_is_given_in_any_form(env, options):
+    chain = round_the_corner()
+    assert evaluate(chain, env, episodes=3, epsilon=0.1, **options) == evaluate(chain, MODEL, episodes=3, epsilon=0.1)
+
+
+@pytest.mark.parametrize("controller", [None, "runs/demo", 3, MODEL, []])
+def test_what_is_not_a_chain_is_refused(controller):
+    with pytest.raises(InvalidOption, match="expected a SkillChain"):
+        evaluate(controller)
+
+
+def test_options_need_an_environment():
+    with pytest.raises(InvalidOption, match="env is None"):
+        evaluate(round_the_corner(), env_kwargs={"size": 2})
+    with pytest.raises(UnknownName, match="did you mean 'pbcs/Maze-v0'"):
+        evaluate(round_the_corner(), "pbcs/Mase-v0")

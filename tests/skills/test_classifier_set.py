@@ -1,4 +1,4 @@
-"""A learnt activation set: it leaves out whence the skill fails, is bounded, repeatable, and survives a file."""
+"""A learnt activation set: it leaves out where the skill fails, is bounded, repeatable, and survives a file."""
 
 import numpy as np
 import pytest
@@ -6,34 +6,44 @@ import pytest
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption
 from pbcs_ompl.resettable import make
-from pbcs_ompl.skills import SkillChain, SkillSettings, resume, train
+from pbcs_ompl.skills import SkillChain, resume, train
+from pbcs_ompl.skills.activation_sets import (
+    Ball,
+    ClassifierSet,
+    ClassifierSettings,
+    EnvironmentGoal,
+    from_arrays,
+    kind_of,
+    learn_set,
+    to_arrays,
+)
 from pbcs_ompl.skills.chain import Skill
-from pbcs_ompl.skills.classifier_set import REACH, ClassifierSet, learn_set
 from pbcs_ompl.skills.episodes import run_episodes
-from pbcs_ompl.skills.goals import Ball, Target
-from pbcs_ompl.skills.policy import Frame, SkillPolicy
-from pbcs_ompl.skills.set_arrays import from_arrays, kind_of, to_arrays
+from pbcs_ompl.skills.pbcs import PBCSSettings
+from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
 
 MODEL = make("pbcs/Maze-v0", {"size": 2})
 CENTER, RADIUS = np.array([1.0, 0.9]), 0.15
-GOAL = Ball(np.array([0.9, 1.2]), 0.1)
+BALL, SETTINGS = Ball(CENTER, RADIUS), ClassifierSettings()
+TARGET = Ball(np.array([0.9, 1.2]), 0.1)
 
 
 def straight_up(states):
-    """A policy that walks to GOAL; a wall along y = 1 ends near x = 1, and to the left of that it stops the walk."""
-    return np.clip(GOAL.center - states, -0.1, 0.1)
+    """A policy that walks to TARGET; a wall along y = 1 ends near x = 1, and to the left of that it stops the walk."""
+    return np.clip(TARGET.center - states, -0.1, 0.1)
 
 
 def tried(count, seed):
-    """States around CENTER and whether the policy reaches GOAL from them."""
+    """States around CENTER and whether the policy reaches TARGET from them."""
     rng = np.random.default_rng(seed)
-    states = MODEL.perturb(CENTER, REACH * RADIUS, count, rng)
-    return states, run_episodes(MODEL, straight_up, GOAL, states, epsilon=0.0, max_steps=30, rng=rng).reached
+    states = MODEL.perturb(CENTER, SETTINGS.reach * RADIUS, count, rng)
+    return states, run_episodes(MODEL, straight_up, TARGET, states, epsilon=0.0, max_steps=30, rng=rng,
+                                success_reward=None).reached
 
 
 def learnt():
     states, reached = tried(400, 0)
-    return learn_set(MODEL.observe(states), reached, CENTER, RADIUS, seed=0)
+    return learn_set(MODEL.observe(states), reached, BALL, SETTINGS, seed=0)
 
 
 def test_states_that_the_skill_fails_from_are_left_out():
@@ -45,18 +55,18 @@ def test_states_that_the_skill_fails_from_are_left_out():
 
 
 def test_the_set_ends_where_nothing_was_tried():
-    everywhere = learn_set(MODEL.observe(tried(50, 0)[0]), np.ones(50, dtype=bool), CENTER, RADIUS, seed=0)
+    everywhere = learn_set(MODEL.observe(tried(50, 0)[0]), np.ones(50, dtype=bool), BALL, SETTINGS, seed=0)
     states = MODEL.perturb(CENTER, 0.5, 300, np.random.default_rng(2))
-    near = everywhere.distance(MODEL, states) <= REACH * RADIUS
+    near = everywhere.distance(MODEL, states) <= SETTINGS.reach * RADIUS
     assert 0 < near.sum() < len(near)
     np.testing.assert_array_equal(everywhere.contains(MODEL, states), near)
 
 
-def test_speeds_count_although_the_distance_does_not_know_them():
+def test_speeds_count_although_the_distance_leaves_them_out():
     rng = np.random.default_rng(0)
     observations = np.column_stack([rng.uniform(-0.1, 0.1, 400), rng.uniform(-5.0, 5.0, 400)])
     fast = observations[:, 1] > 0.0
-    found = learn_set(observations, fast, np.zeros(2), RADIUS, seed=0)
+    found = learn_set(observations, fast, Ball(np.zeros(2), RADIUS), SETTINGS, seed=0)
     assert found.probability(np.array([[0.0, 2.0], [0.0, -2.0]])).round() == pytest.approx([1.0, 0.0])
 
 
@@ -65,7 +75,7 @@ def test_equal_seeds_give_equal_sets():
     assert all(one[name].tobytes() == other[name].tobytes() for name in one)
 
 
-@pytest.mark.parametrize("part", [GOAL, Target(0.2), learnt()], ids=kind_of)
+@pytest.mark.parametrize("part", [TARGET, EnvironmentGoal(0.2), learnt()], ids=kind_of)
 def test_arrays_and_back(part):
     arrays = to_arrays(part, "a")
     back = from_arrays(kind_of(part), arrays, "a")
@@ -79,19 +89,19 @@ def test_arrays_and_back(part):
 
 def test_a_chain_with_a_learnt_set_survives_a_file(tmp_path):
     actor = Policy(((np.eye(2, dtype=np.float32), np.zeros(2, np.float32)),), MODEL.action_low, MODEL.action_high)
-    policy = SkillPolicy(actor, Frame.plain(2))
-    skills = (Skill(policy, GOAL, learnt()), Skill(policy, learnt(), Target(0.2)))
+    policy = SkillPolicy(actor, ObservationTransform.identity(2))
+    skills = (Skill(policy, TARGET, learnt()), Skill(policy, learnt(), EnvironmentGoal(0.2)))
     SkillChain(skills, CENTER, MODEL.spec, 50).save(tmp_path)
     loaded = SkillChain.load(tmp_path)
     assert [kind_of(skill.activation) for skill in loaded.skills] == ["ball", "classifier"]
-    assert [kind_of(skill.goal) for skill in loaded.skills] == ["classifier", "target"]
+    assert [kind_of(skill.target) for skill in loaded.skills] == ["classifier", "goal"]
     states, _ = tried(100, 4)
     np.testing.assert_array_equal(loaded.skills[1].activation.contains(MODEL, states),
                                   learnt().contains(MODEL, states))
 
 
 class StopAfter:
-    """A Ctrl-C at the first report of a training that has so many skills."""
+    """A Ctrl-C at the first report of a training that has this number of skills."""
 
     def __init__(self, skills):
         self.skills = skills
@@ -101,7 +111,7 @@ class StopAfter:
             raise KeyboardInterrupt
 
 
-def test_training_with_learnt_sets_solves_the_small_maze_and_goes_on_after_a_stop(tmp_path):
+def test_training_with_learnt_sets_solves_the_small_maze_and_resumes_after_a_stop(tmp_path):
     options = {"env_kwargs": {"size": 2}, "seed": 1, "settings": {"activation": "classifier"}}
     whole = train("pbcs/Maze-v0", **options)
     assert whole.solved
@@ -119,4 +129,4 @@ def test_training_with_learnt_sets_solves_the_small_maze_and_goes_on_after_a_sto
 
 def test_an_unknown_kind_of_set_is_refused():
     with pytest.raises(InvalidOption, match="one of ball, classifier"):
-        SkillSettings(activation="box")
+        PBCSSettings(activation="box")

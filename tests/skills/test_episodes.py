@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pbcs_ompl.resettable import make
-from pbcs_ompl.skills.episodes import run_episodes, with_random_actions
-from pbcs_ompl.skills.goals import Ball, Target
-from pbcs_ompl.skills.shaping import GOAL_REWARD
+from pbcs_ompl.skills.activation_sets import Ball, EnvironmentGoal
+from pbcs_ompl.skills.episodes import run_episodes, shaped_rewards, with_random_actions
 
 MODEL = make("pbcs/Maze-v0", {"size": 2})
+REWARD = 10.0
+distances = st.lists(st.floats(0.11, 50.0), min_size=2, max_size=30)
 
 
 def towards(point):
@@ -20,9 +23,10 @@ def starts(count, seed=0):
 
 
 def test_a_batch_equals_single_episodes():
-    goal, act = Ball(np.array([0.5, 0.5]), 0.1), towards([0.5, 0.5])
-    together = run_episodes(MODEL, act, goal, starts(20), epsilon=0.0, max_steps=30, rng=np.random.default_rng(0))
-    apart = [run_episodes(MODEL, act, goal, one[None], epsilon=0.0, max_steps=30, rng=np.random.default_rng(0))
+    target, act = Ball(np.array([0.5, 0.5]), 0.1), towards([0.5, 0.5])
+    options = {"epsilon": 0.0, "max_steps": 30, "rng": np.random.default_rng(0), "success_reward": REWARD}
+    together = run_episodes(MODEL, act, target, starts(20), **options)
+    apart = [run_episodes(MODEL, act, target, one[None], **options)
              for one in starts(20)]
     assert together.steps.tolist() == [episode.steps[0] for episode in apart]
     assert together.reached.all()
@@ -34,25 +38,25 @@ def test_a_batch_equals_single_episodes():
 
 
 def test_transitions_are_steps_of_the_environment():
-    episodes = run_episodes(MODEL, towards([1.5, 0.5]), Target(0.2), starts(10), epsilon=0.5, max_steps=15,
-                            rng=np.random.default_rng(1))
+    episodes = run_episodes(MODEL, towards([1.5, 0.5]), EnvironmentGoal(0.2), starts(10), epsilon=0.5, max_steps=15,
+                            rng=np.random.default_rng(1), success_reward=REWARD)
     np.testing.assert_array_equal(MODEL.transition(episodes.states, episodes.controls).states, episodes.next_states)
 
 
 def test_only_the_last_transition_of_a_successful_episode_is_terminal():
-    goal = Ball(np.array([0.5, 0.5]), 0.1)
-    episodes = run_episodes(MODEL, towards([0.5, 0.5]), goal, np.array([[0.2, 0.2], [1.5, 1.5]]), epsilon=0.0,
-                            max_steps=10, rng=np.random.default_rng(0))
+    target = Ball(np.array([0.5, 0.5]), 0.1)
+    episodes = run_episodes(MODEL, towards([0.5, 0.5]), target, np.array([[0.2, 0.2], [1.5, 1.5]]), epsilon=0.0,
+                            max_steps=10, rng=np.random.default_rng(0), success_reward=REWARD)
     assert episodes.reached.tolist() == [True, False]
     assert episodes.terminals.sum() == 1
-    assert episodes.rewards[episodes.terminals].tolist() == [GOAL_REWARD]
-    assert goal.contains(MODEL, episodes.next_states[episodes.terminals]).all()
+    assert episodes.rewards[episodes.terminals].tolist() == [REWARD]
+    assert target.contains(MODEL, episodes.next_states[episodes.terminals]).all()
     assert episodes.success_rate == 0.5
 
 
 def test_unshaped_rewards_are_the_environments():
-    episodes = run_episodes(MODEL, towards([0.5, 1.5]), Target(0.2), np.array([[0.5, 1.2]]), epsilon=0.0,
-                            max_steps=10, rng=np.random.default_rng(0), shaped=False)
+    episodes = run_episodes(MODEL, towards([0.5, 1.5]), EnvironmentGoal(0.2), np.array([[0.5, 1.2]]), epsilon=0.0,
+                            max_steps=10, rng=np.random.default_rng(0), success_reward=None)
     assert episodes.rewards.tolist() == [1.0]
 
 
@@ -62,3 +66,25 @@ def test_a_share_epsilon_of_the_actions_is_random_and_in_the_box(epsilon):
     changed = (controls != 0.05).any(axis=1)
     assert abs(changed.mean() - epsilon) < 0.02
     assert (np.abs(controls) <= 0.1).all()
+
+
+def test_shaped_rewards_computed_by_hand():
+    before = np.array([1.0, 0.5, 2.0, 0.05])
+    after = np.array([0.5, 1.0, 0.1, 1.0])
+    reached = np.array([False, False, True, False])
+    # 1/0.5 - 1/1 = 1; 1/1 - 1/0.5 = -1; reached: 10; 1/1 - 1/0.1 = -9 (0.05 is bounded below by the radius 0.1)
+    np.testing.assert_allclose(shaped_rewards(before, after, reached, 0.1, REWARD), [1.0, -1.0, REWARD, -9.0])
+
+
+@given(distances)
+def test_a_path_earns_the_difference_of_potentials_of_its_ends(along):
+    """Ng et al. 1999: a potential cannot be collected by going round in circles."""
+    before, after = np.array(along[:-1]), np.array(along[1:])
+    total = shaped_rewards(before, after, np.zeros(len(before), bool), 0.1, REWARD).sum()
+    np.testing.assert_allclose(total, 1 / along[-1] - 1 / along[0], atol=1e-9)
+
+
+@given(distances)
+def test_no_step_outside_the_goal_is_worth_as_much_as_reaching_it(along):
+    before, after = np.array(along[:-1]), np.array(along[1:])
+    assert (shaped_rewards(before, after, np.zeros(len(before), bool), 0.1, REWARD) < REWARD).all()

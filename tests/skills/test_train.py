@@ -1,4 +1,4 @@
-"""Training end to end: it solves, repeats itself, stops anywhere and goes on; its mistakes are named."""
+"""Training end to end: it solves, repeats itself, stops anywhere and resumes; its mistakes are named."""
 
 import json
 import signal
@@ -16,7 +16,6 @@ from pbcs_ompl.core.errors import (
     InvalidOption,
     Mismatch,
     RunFolderError,
-    TrainingStalled,
     UnknownName,
 )
 from pbcs_ompl.resettable import make
@@ -71,8 +70,8 @@ class StopAfter:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_training_that_was_stopped_or_killed_goes_on_bit_for_bit(tmp_path, number):
-    """A Ctrl-C may arrive anywhere within a step, which is finished first; a kill goes back to the last checkpoint."""
+def test_a_training_that_was_stopped_or_killed_resumes_bit_for_bit(tmp_path, number):
+    """A Ctrl-C may happen anywhere within a step, which is finished first; a kill goes back to the last checkpoint."""
     whole = train("pbcs/Maze-v0", env_kwargs={"size": 3}, seed=1)
     script = ("import sys; from pbcs_ompl.skills import train, training; training.CHECKPOINT_SECONDS = 0.05; "
               f"train('pbcs/Maze-v0', env_kwargs={{'size': 3}}, seed=1, out={str(tmp_path / 'run')!r}, "
@@ -89,72 +88,68 @@ def test_a_training_that_was_stopped_or_killed_goes_on_bit_for_bit(tmp_path, num
     assert fingerprint(resume(tmp_path / "run")) == fingerprint(whole)
 
 
-def outcome(run):
-    """The result of a training, also of one whose budget ended."""
-    try:
-        return run()
-    except TrainingStalled as stalled:
-        return stalled.result
-
-
 @pytest.mark.parametrize(("method", "budget"), [("pbcs", 10_000_000), ("pb", 20_000), ("backplay", 20_000),
                                                 ("plain", 30_000), ("bootstrapped", 30_000),
                                                 ("offline", 30_000)])
-def test_an_interrupted_training_goes_on_bit_for_bit(tmp_path, method, budget):
+def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, method, budget):
     options = {"env_kwargs": MAZE, "seed": 1, "method": method, "max_transitions": budget}
-    whole = outcome(lambda: train("pbcs/Maze-v0", **options))
+    whole = train("pbcs/Maze-v0", **options)
     with pytest.raises(KeyboardInterrupt):
         train("pbcs/Maze-v0", **options, out=tmp_path / "run", on_progress=StopAfter(3))
     for stop in (1, 2):
         with pytest.raises(KeyboardInterrupt):
             resume(tmp_path / "run", on_progress=StopAfter(stop))
-    result = outcome(lambda: resume(tmp_path / "run"))
+    result = resume(tmp_path / "run")
     assert fingerprint(result) == fingerprint(whole)
-    assert (tmp_path / "run" / "checkpoint.npz").exists() == (result.stalled is not None)
+    assert (tmp_path / "run" / "checkpoint.npz").exists() == (not result.complete)
 
 
-def test_a_stop_while_a_link_is_learnt_anew_goes_on_bit_for_bit(tmp_path):
+def test_a_stop_while_a_link_is_trained_again_resumes_bit_for_bit(tmp_path):
     """An impossible standard of verification keeps the chain open until the budget ends."""
     options = {"env_kwargs": MAZE, "seed": 2, "max_transitions": 150_000,
                "settings": {"verify_episodes": 20, "epsilon": 0.9, "test_epsilon": 0.0}}
-    with pytest.raises(TrainingStalled) as whole:
-        train("pbcs/Maze-v0", **options)
+    first = train("pbcs/Maze-v0", **options)
     with pytest.raises(KeyboardInterrupt):
         train("pbcs/Maze-v0", **options, out=tmp_path / "run", on_progress=StopAfter(60))
-    with pytest.raises(TrainingStalled) as resumed:
-        resume(tmp_path / "run")
-    first, second = whole.value.result, resumed.value.result
+    second = resume(tmp_path / "run")
+    assert not first.complete
     assert (first.train_transitions, first.updates) == (second.train_transitions, second.updates)
 
 
-def test_a_budget_ends_a_training_with_what_was_learnt_and_a_larger_one_goes_on(tmp_path):
-    with pytest.raises(TrainingStalled, match="budget of 3000") as stalled:
-        train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, max_transitions=3000, out=tmp_path / "run")
-    assert not stalled.value.result.solved
-    assert stalled.value.result.trajectory is not None
+def test_a_budget_ends_a_training_with_what_was_learnt_and_a_larger_one_continues(tmp_path):
+    result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, max_transitions=3000, out=tmp_path / "run")
+    assert (result.solved, result.complete, result.nominal) == (False, False, None)
+    assert "budget of 3000" in result.reason
+    assert result.trajectory is not None
     assert (tmp_path / "run" / "result.json").is_file()
     assert resume(tmp_path / "run", max_transitions=10_000_000).solved
 
 
-def test_an_unreachable_goal_stalls(tmp_path):
-    with pytest.raises(TrainingStalled, match="no way to the goal"):
-        train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, max_transitions=50, out=tmp_path / "run")
+def test_a_goal_that_the_planner_does_not_reach_is_the_reason(tmp_path):
+    result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, max_transitions=50, out=tmp_path / "run")
+    assert (result.solved, result.chain) == (False, None)
+    assert "no path to the goal" in result.reason
+
+
+def test_a_chain_that_misses_the_criterion_says_by_how_much():
+    impossible = {"robust_epsilon": 1.0, "robust_episodes": 20, "verify_episodes": 0}
+    result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, settings=impossible)
+    assert (result.solved, result.complete, result.robust.episodes) == (False, True, 20)
+    assert result.reason == (f"{result.robust.successes} of 20 executions with 100% random actions succeed, "
+                             "expected 95%")
 
 
 def test_the_plain_agent_does_not_need_a_plan():
-    with pytest.raises(TrainingStalled) as stalled:
-        train("pbcs/Maze-v0", env_kwargs=MAZE, method="plain", max_transitions=6000)
-    assert stalled.value.result.plan_transitions == 0
-    assert stalled.value.result.train_transitions >= 6000
+    result = train("pbcs/Maze-v0", env_kwargs=MAZE, method="plain", max_transitions=6000)
+    assert result.plan_transitions == 0
+    assert result.train_transitions >= 6000
 
 
 def test_the_thesis_preset_trains_with_its_own_networks_and_order():
-    with pytest.raises(TrainingStalled) as stalled:
-        train("pbcs/Maze-v0", env_kwargs=MAZE, preset="thesis", max_transitions=4000, seed=0,
-              agent_settings={"hidden": [32, 32]})
-    result = stalled.value.result
+    result = train("pbcs/Maze-v0", env_kwargs=MAZE, preset="thesis", max_transitions=4000, seed=0,
+                   agent_settings={"hidden": [32, 32]})
     assert result.updates > 0
-    assert len(result.milestones) == result.trajectory.length + 1
+    assert len(result.waypoints) == result.trajectory.length + 1
 
 
 def test_a_plan_made_before_is_used():
@@ -174,8 +169,11 @@ def test_the_planner_can_be_chosen_and_the_folder_says_which(tmp_path):
     assert (config["planner"], config["planner_kwargs"]) == ("KPIECE1", {"control_duration": 2})
     found = Trajectory.load(tmp_path / "run" / "trajectory.npz")
     assert found.planner == "KPIECE1"
-    with pytest.raises(InvalidOption, match="remove planner"):
-        train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=found, planner="KPIECE1")
+    for planner in ("KPIECE1", "Ex"):
+        with pytest.raises(InvalidOption, match="remove planner"):
+            train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=found, planner=planner)
+    with pytest.raises(InvalidOption, match="remove trajectory"):
+        train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=found, method="plain")
     with pytest.raises(KeyboardInterrupt):
         resume(tmp_path / "run", on_progress=StopAfter(1))
 
@@ -187,7 +185,9 @@ def test_the_planner_can_be_chosen_and_the_folder_says_which(tmp_path):
     ({"planner": "Exx"}, UnknownName, "did you mean 'Ex'"),
     ({"planner_kwargs": {"hld": 10}}, InvalidOption, "no option 'hld'"),
     ({"method": "plain", "planner": "RRTNH"}, InvalidOption, "without a plan"),
-    ({"prest": "fast"}, UnknownName, "did you mean 'preset'"),
+    ({"method": "plain", "planner": "Ex"}, InvalidOption, "without a plan"),
+    ({"method": "plain", "settings": {"alpha": 3}}, InvalidOption, "'alpha'; it is a setting of pbcs"),
+    ({"seed": -1}, InvalidOption, "seed"),
     ({"settings": {"bta": 3}}, InvalidOption, "did you mean 'beta'"),
     ({"agent_settings": {"discont": 0.5}}, InvalidOption, "did you mean 'discount'"),
     ({"agent_settings": {"discount": 1.0}}, InvalidOption, "discount"),

@@ -108,7 +108,7 @@ def _training(folder: Folder) -> Content:
                ("updates", short(result["updates"])), ("time", duration(result["seconds"]))]
     if result["wilson"] is not None:
         summary.insert(0, ("success with 10 % random actions", percent(result["success_rate"], result["wilson"])))
-    reason = result["stalled"] or "the success rate of the chain is too low"
+    reason = result["reason"]
     return Content(title, "solved" if result["solved"] else "not solved", result["solved"], summary,
                    str(config["seed"]), failures=[] if result["solved"] else [("not solved", reason)])
 

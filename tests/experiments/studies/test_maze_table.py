@@ -11,9 +11,9 @@ STUDY = find_study("maze-table")
 SIZES = (2, 3, 4, 5, 7, 10, 15)
 
 
-def record(label, size, index, solved, *, cost=100_000, skills=1, stalled=None):
+def record(label, size, index, solved, *, cost=100_000, skills=1):
     return {"label": label, "size": size, "index": index, "seed": 500 + index, "solved": solved, "succeeds": solved,
-            "transitions": cost, "skills": skills, "stalled": stalled, "max_transitions": 1_000_000,
+            "transitions": cost, "skills": skills, "complete": True, "reason": None, "max_transitions": 1_000_000,
             "success_rate": float(solved), "nominal_success_rate": float(solved)}
 
 

@@ -70,8 +70,8 @@ def _bars(records: Records) -> list[Claim]:
 
 
 def _reason(record: dict[str, Any]) -> str:
-    if record["stalled"]:
-        return str(record["stalled"])
+    if not record["complete"]:
+        return str(record["reason"])
     return (f"{record['success_rate']:.0%} of the noisy executions succeed, "
             f"{record['nominal_success_rate']:.0%} of those without noise")
 

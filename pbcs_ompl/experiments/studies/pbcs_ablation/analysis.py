@@ -54,7 +54,7 @@ def _more(claim: str, records: Records, key: str, parameter: str, values: tuple[
     """
     swept = _swept(records, parameter)
     one, other = ({(r["size"], r["seed"]): float(r[key]) for r in swept.get(value, [])
-                   if key != "skills" or not r["stalled"]} for value in values)
+                   if key != "skills" or r["complete"]} for value in values)
     return greater(claim, one, other, (f"{values[0]:g}", f"{values[1]:g}"), source)
 
 

@@ -37,7 +37,7 @@ def _literal(pairs: list[tuple[dict[str, Any], dict[str, Any]]]) -> Claim:
                  {"2x2": rate(sum(run["solved"] for run in small), len(small)),
                   "3x3": rate(sum(run["solved"] for run in runs) - sum(run["solved"] for run in small),
                               len(runs) - len(small)),
-                  "covered, where the budget ended": [run["stalled"] for run in runs if run["stalled"]]},
+                  "covered, where the budget ended": [run["reason"] for run in runs if not run["complete"]]},
                  "[Matheron2020] 7.4, which gives no budget")
 
 

@@ -49,7 +49,7 @@ def _medians(records: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _failures(records: list[dict[str, Any]]) -> str:
-    failed = [f"seed {record['seed']}: {record['stalled'] or 'fewer than 95 of 100 noisy executions succeed'}"
+    failed = [f"seed {record['seed']}: {record['reason']}"
               for record in records if not record["solved"]]
     return "; ".join(failed)
 

@@ -5,7 +5,7 @@ from typing import Any
 from pbcs_ompl.experiments.training_run import trained
 
 KEPT = ("solved", "success_rate", "nominal_success_rate", "steps_median", "skills", "plan_transitions",
-        "train_transitions", "updates", "cpu_seconds", "stalled")
+        "train_transitions", "updates", "cpu_seconds", "reason")
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:

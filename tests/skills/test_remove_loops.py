@@ -1,4 +1,4 @@
-"""Detours are erased along the shortest way: compared with a breadth-first search."""
+"""Loops are erased along the path with the fewest hops: compared with a breadth-first search."""
 
 from collections import deque
 
@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pbcs_ompl.resettable import make
-from pbcs_ompl.skills.shorten import shorten
+from pbcs_ompl.skills.waypoints import remove_loops
 
 MODEL = make("pbcs/Maze-v0", {"size": 2})
 walks = st.lists(st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)), min_size=1, max_size=40)
@@ -27,18 +27,18 @@ def fewest_hops(states, gap):
 
 @given(walks, st.floats(0.01, 0.3))
 @settings(max_examples=60, deadline=None)
-def test_the_way_is_the_shortest(steps, gap):
+def test_the_path_has_the_fewest_hops(steps, gap):
     states = np.cumsum(np.array([(1.0, 1.0), *steps]), axis=0)
-    way = shorten(MODEL, states, gap)
-    assert way[0] == 0
-    assert way[-1] == len(states) - 1
-    assert (np.diff(way) > 0).all()
-    hops = np.linalg.norm(np.diff(states[way], axis=0), axis=1)
-    assert ((hops <= gap) | (np.diff(way) == 1)).all()
-    assert len(way) - 1 == fewest_hops(states, gap)
+    path = remove_loops(MODEL, states, gap)
+    assert path[0] == 0
+    assert path[-1] == len(states) - 1
+    assert (np.diff(path) > 0).all()
+    hops = np.linalg.norm(np.diff(states[path], axis=0), axis=1)
+    assert ((hops <= gap) | (np.diff(path) == 1)).all()
+    assert len(path) - 1 == fewest_hops(states, gap)
 
 
 def test_a_loop_is_left_out():
     states = np.array([[0.5, 0.5], [0.6, 0.5], [0.7, 0.5], [0.7, 0.6], [0.6, 0.6], [0.6, 0.5], [0.5, 0.4]])
-    assert shorten(MODEL, states, 0.12).tolist() == [0, 6]
-    assert shorten(MODEL, states, 0.05).tolist() == [0, 1, 5, 6]
+    assert remove_loops(MODEL, states, 0.12).tolist() == [0, 6]
+    assert remove_loops(MODEL, states, 0.05).tolist() == [0, 1, 5, 6]

@@ -1,0 +1,174 @@
+"""Trains one agent for one skill after another along the waypoints of a plan."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
+from pbcs_ompl.skills.activation_sets import ClassifierSet, ClassifierSettings, Target, learn_set
+from pbcs_ompl.skills.agent_interface import Agent
+from pbcs_ompl.skills.chain import Skill
+from pbcs_ompl.skills.episodes import Act, Episodes, run_episodes
+from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
+from pbcs_ompl.skills.settings import EpisodeSettings
+from pbcs_ompl.skills.waypoints import Waypoints
+
+
+class SkillTrainer:
+    """Collects episodes, trains the agent on them, and tests it; counts every transition.
+
+    Args:
+        make_agent: Builds an agent, a stack of one, from a seed.
+        waypoints: Where episodes start and skills end.
+        settings: How episodes are run and learnt from.
+        counter: Counts transitions.
+        rng: Source of start states and exploration noise.
+    """
+
+    def __init__(self, make_agent: Callable[[int], Agent], waypoints: Waypoints, settings: EpisodeSettings,
+                 counter: Counter, rng: np.random.Generator):
+        self.make_agent = make_agent
+        self.waypoints = waypoints
+        self.settings = settings
+        self.model: ResettableModel = waypoints.model
+        self.counter = counter
+        self.rng = rng
+        self.updates_due = 0.0
+        self.updates_before = 0
+        self.agent_seed = int(rng.integers(2**31))
+        self.agent = make_agent(self.agent_seed)
+        self.set_target(waypoints.last)
+
+    def set_target(self, end_index: int, target: Target | None = None) -> None:
+        """Train towards the waypoint `end_index`: to its ball or the environment's goal, or to `target` around it."""
+        self.end_index = end_index
+        self.target: Target = self.waypoints.target(end_index) if target is None else target
+        self.transform: ObservationTransform = self.waypoints.transform(end_index)
+
+    def start_skill(self, end_index: int, target: Target, *, warm_start: bool) -> None:
+        """Begin a new skill that ends at `end_index`: without replay and, without `warm_start`, with new networks."""
+        self.set_target(end_index, target)
+        self.agent.clear_replay()
+        if not warm_start and self.agent.num_updates:
+            self.restart()
+
+    def restart(self) -> None:
+        """Continue with new networks and an empty replay buffer."""
+        self.updates_before += self.agent.num_updates
+        self.agent_seed = int(self.rng.integers(2**31))
+        self.agent = self.make_agent(self.agent_seed)
+
+    @property
+    def updates(self) -> int:
+        """Gradient steps so far."""
+        return self.updates_before + self.agent.num_updates
+
+    def act(self, states: Array) -> Array:
+        """Return the agent's actions [B, A] in states [B, D]."""
+        actions: Array = self.agent.act(self._observe(states)[None])[0]
+        return actions
+
+    def explore(self, states: Array) -> Array:
+        """Return the actions [B, A] that the agent itself would try in states [B, D]."""
+        actions: Array = self.agent.explore(self._observe(states)[None])[0]
+        return actions
+
+    def test(self, index: int) -> float:
+        """Return the success rate of beta episodes from the ball of waypoint `index`."""
+        starts = self.waypoints.draw_starts(np.full(self.settings.beta, index), self.rng, self.counter)
+        return self._run(self.act, starts, self.settings.test_epsilon).success_rate
+
+    def session(self, index: int, rehearsal_fraction: float = 0.0) -> float:
+        """Train on beta episodes from the ball of waypoint `index`; return their success rate.
+
+        Args:
+            index: Where episodes start.
+            rehearsal_fraction: Fraction of them that start from random waypoints between `index` and the target.
+
+        Source: [Matheron2020] Alg. 8. Differs: `rehearsal_fraction`, and see `session_from`.
+        """
+        indices = np.full(self.settings.beta, index)
+        rehearsed = self.rng.random(len(indices)) < rehearsal_fraction
+        indices[rehearsed] = self.rng.integers(index, self.end_index, rehearsed.sum())
+        return self.session_from(indices)
+
+    def session_from(self, indices: IndexArray) -> float:
+        """Train on one episode from the ball of each waypoint in `indices`; return their success rate.
+
+        Updates follow each batch of `episodes_per_batch` episodes.
+        """
+        successes = 0.0
+        for first in range(0, len(indices), self.settings.episodes_per_batch):
+            batch = indices[first:first + self.settings.episodes_per_batch]
+            starts = self.waypoints.draw_starts(batch, self.rng, self.counter)
+            episodes = self._run(self.explore, starts, self.settings.epsilon)
+            self.add_transitions(episodes.states, episodes.controls, episodes.rewards, episodes.next_states,
+                                 episodes.terminals)
+            self._train(episodes.transitions)
+            successes += episodes.reached.sum()
+        return float(successes / len(indices))
+
+    def add_transitions(self, states: Array, controls: Array, rewards: Array, next_states: Array,
+                        terminals: BoolArray) -> None:
+        """Add transitions to the replay buffer as the present policy observes them; [N, ...] each."""
+        before, after = self._observe(states), self._observe(next_states)
+        self.agent.add_transitions(before[None], controls[None], rewards[None], after[None], terminals[None])
+
+    def learn_activation(self, start_index: int, policy: SkillPolicy, settings: ClassifierSettings) -> ClassifierSet:
+        """Return where `policy` may start around the waypoint `start_index`, learnt by trying it there.
+
+        Args:
+            start_index: The middle of the set.
+            policy: The policy of a finished skill that leads to the present target.
+            settings: Number of samples, size and training of the classifier.
+        """
+        ball = self.waypoints.ball(start_index)
+        around = self.rng.choice(self.waypoints.near(start_index), settings.samples)
+        starts = self.waypoints.draw_starts(around, self.rng, self.counter)
+        episodes = self._run(lambda states: policy.act(self.model.observe(states)), starts, self.settings.test_epsilon)
+        return learn_set(self.model.observe(starts), episodes.reached, ball, settings, int(self.rng.integers(2**31)))
+
+    def skill(self, start_index: int, policy: SkillPolicy) -> Skill:
+        """Return `policy` as a skill that starts in the ball of `start_index` and leads to the present target."""
+        return Skill(policy, self.waypoints.ball(start_index), self.target)
+
+    def policy(self) -> SkillPolicy:
+        """Return a snapshot of the agent's policy."""
+        return SkillPolicy(self.agent.policy(0), self.transform)
+
+    def state(self) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+        """Return everything needed to resume bit for bit, as plain values and arrays."""
+        plain = {"end_index": self.end_index, "rng": self.rng.bit_generator.state,
+                 "transitions": self.counter.count, "updates_due": self.updates_due,
+                 "updates_before": self.updates_before, "agent_seed": self.agent_seed}
+        return plain, self.agent.state_dict()
+
+    def restore(self, plain: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
+        """Resume from what `state` returned."""
+        self.set_target(plain["end_index"])
+        self.rng.bit_generator.state = plain["rng"]
+        self.counter.count = plain["transitions"]
+        self.updates_due = plain["updates_due"]
+        self.updates_before = plain["updates_before"]
+        self.agent_seed = plain["agent_seed"]
+        self.agent = self.make_agent(self.agent_seed)
+        self.agent.load_state_dict(arrays)
+
+    def _observe(self, states: Array) -> Array:
+        return self.transform(self.model.observe(states))
+
+    def _run(self, act: Act, starts: Array, epsilon: float) -> Episodes:
+        settings = self.settings
+        episodes = run_episodes(self.model, act, self.target, starts, epsilon=epsilon, max_steps=settings.max_steps,
+                                rng=self.rng, success_reward=settings.success_reward if settings.shaped else None)
+        self.counter.count += episodes.transitions
+        return episodes
+
+    def _train(self, transitions: int) -> None:
+        self.updates_due += transitions * self.settings.updates_per_transition
+        whole = int(self.updates_due)
+        self.updates_due -= whole
+        if whole:
+            self.agent.train(whole)
