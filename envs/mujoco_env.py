@@ -186,7 +186,7 @@ class BatchedMujocoEnv(gymnasium.Env[Array, Array], ABC):
         self._pool = self._renderer = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy needs: threads and renderer are made anew when they are wanted."""
+        """Return what a copy needs: threads and renderer are made again when they are needed."""
         return {**self.__dict__, "_pool": None, "_renderer": None}
 
     def _advance(self, states: Array, controls: Array) -> Array:

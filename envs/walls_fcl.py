@@ -17,7 +17,7 @@ With radius 0 FCL misses walls that the end of a segment merely touches. So its 
 what touches a wall is a hit, and what stays 2e-9 away is none.
 """
 SCALE = 2.0**14
-"""FCL works in lengths that are so many times larger, since it takes what overlaps by less than about 1e-7 for apart.
+"""FCL works in lengths that are this many times larger: it misses overlaps below about 1e-7.
 
 Without it one in twenty segments that graze a corner is missed. A power of two keeps every bit of the coordinates.
 """
@@ -60,7 +60,7 @@ class WallsFcl:
         return np.array([self.segment_hits(p, q) for p, q in zip(starts, ends, strict=True)], dtype=np.bool_)
 
     def segment_hits(self, start: Array, end: Array) -> bool:
-        """Tell whether the segment from start [2] to end [2] touches a wall."""
+        """Return whether the segment from start [2] to end [2] touches a wall."""
         start, end = SCALE * np.asarray(start), SCALE * np.asarray(end)
         along = end - start
         length = float(np.hypot(*along))

@@ -41,7 +41,7 @@ class Puck(gymnasium.Env):
         success = bool(self.goal_distance(self._state[None])[0] < self.goal_threshold)
         return self._state.copy(), float(success), success, False, {"is_success": success}
 
-    # Two methods make it resettable anywhere, and the distance tells planners where the goal is.
+    # Two methods make it resettable, and the distance gives planners the goal.
     def get_env_state(self) -> np.ndarray:
         return self._state.copy()
 

@@ -28,7 +28,7 @@ SLIDE, CELLS = FIRST_FREE, FIRST_FREE + 1
 @njit(cache=True)
 def hits_rectangle(x0: float, y0: float, x1: float, y1: float,
                    left: float, bottom: float, right: float, top: float) -> bool:
-    """Tell whether the segment (x0, y0)-(x1, y1) touches the closed rectangle.
+    """Return whether the segment (x0, y0)-(x1, y1) touches the closed rectangle.
 
     Separating axes: the two of the rectangle, compared exactly, then the normal of the segment, on which the
     two extreme corners are compared. A pass so close to a corner that rounding hides the sign is a hit, so
@@ -90,7 +90,7 @@ def _entry(x0: float, y0: float, dx: float, dy: float,
 @njit(cache=True)
 def _slide(rectangles: Array, lists: IndexArray, begin: int, end: int,
            x0: float, y0: float, x1: float, y1: float) -> Point:
-    """Return the last point of the step before the walls, or its start where there is no room to move."""
+    """Return the last point of the step before the walls, or its start where there is no space to move."""
     dx, dy = x1 - x0, y1 - y0
     fraction = 1.0
     for k in range(begin, end):

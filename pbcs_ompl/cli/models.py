@@ -30,7 +30,7 @@ def goal_words(model: ResettableModel) -> str:
 
 
 def note_rules(model: ResettableModel) -> None:
-    """Tell on stderr what is explored and sought where an adapter, not the environment, decides it."""
+    """Print on stderr what is explored and what is a success where an adapter, not the environment, decides it."""
     if isinstance(getattr(model, "env", None), RestorableEnv):
         print(f"feature   {feature_words(model)}\ngoal      {goal_words(model)}", file=sys.stderr)
 

@@ -19,7 +19,7 @@ def did_you_mean(name: str, choices: Iterable[str]) -> str:
 
 
 class PbcsError(Exception):
-    """Base of all errors that a user can mend."""
+    """Base of all errors that a user can fix."""
 
     exit_code = 2
 

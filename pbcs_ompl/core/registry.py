@@ -1,4 +1,4 @@
-"""Find plug-ins by entry point: our own planners, agents and environments come through the same door as anybody's."""
+"""Find plug-ins by entry point; ours are registered in the same way as those of others."""
 
 from functools import cache
 from importlib import import_module

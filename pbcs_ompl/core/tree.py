@@ -132,7 +132,7 @@ class Tree:
         self._size += count
 
     def reserve(self, count: int) -> None:
-        """Make room for `count` more nodes."""
+        """Allocate space for `count` more nodes."""
         needed = self._size + count
         if needed > len(self.columns.parents):
             self.columns = self._resized(max(needed, GROWTH * len(self.columns.parents)))

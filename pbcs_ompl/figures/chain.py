@@ -8,7 +8,7 @@ from matplotlib.patches import Circle
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED
-from pbcs_ompl.figures.maze import draw_line, legend_below, plane, stage
+from pbcs_ompl.figures.maze import draw_line, legend_below, map_axes, project_2d
 
 
 def chain_figure(model: ResettableModel, *, trajectory: Array | None, rollout: Array | None,
@@ -18,16 +18,16 @@ def chain_figure(model: ResettableModel, *, trajectory: Array | None, rollout: A
     Args:
         activations: Centre (a state [D]) and radius of each skill's activation set.
     """
-    figure, axes = stage(model, title)
+    figure, axes = map_axes(model, title)
     if trajectory is not None:
-        draw_line(axes, plane(model, trajectory), color=RED, linewidth=0.9, alpha=0.8, zorder=3,
+        draw_line(axes, project_2d(model, trajectory), color=RED, linewidth=0.9, alpha=0.8, zorder=3,
                   label=f"planned, {len(trajectory) - 1} steps")
     if rollout is not None:
-        draw_line(axes, plane(model, rollout), color=GREEN, linewidth=2, zorder=4,
+        draw_line(axes, project_2d(model, rollout), color=GREEN, linewidth=2, zorder=4,
                   label=f"skill chain, {len(rollout) - 1} steps")
     label: str | None = f"{len(activations)} activation set{'s' if len(activations) > 1 else ''}"
     for centre, radius in activations:
-        x, y = plane(model, centre)[0]
+        x, y = project_2d(model, centre)[0]
         axes.add_patch(Circle((x, y), radius, fill=False, edgecolor=PURPLE, linewidth=1.8, zorder=5,
                               label=label))
         label = None  # one line in the legend stands for all circles

@@ -9,7 +9,7 @@ from pbcs_ompl.core.errors import Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.figures.canvas import RED
-from pbcs_ompl.figures.maze import draw_line, legend_below, stage
+from pbcs_ompl.figures.maze import draw_line, legend_below, map_axes
 
 FIELD, ARROWS = 120, 18
 
@@ -29,7 +29,7 @@ def critic_figure(model: ResettableModel, policy: Callable[[Array], Array],
     if len(model.state_low) != 2:
         raise Mismatch(f"a critic field needs states of two dimensions, {model.spec.id} has "
                        f"{len(model.state_low)}")
-    figure, axes = stage(model, title)
+    figure, axes = map_axes(model, title)
     states, extent = _grid(model, FIELD)
     observations = model.observe(states)
     values = critic(observations, policy(observations)).reshape(FIELD, FIELD)

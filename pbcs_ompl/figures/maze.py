@@ -16,19 +16,19 @@ from pbcs_ompl.figures.canvas import WALL, new_figure
 GOAL = "#f1c40f"
 
 
-def stage(model: ResettableModel, title: str) -> tuple[Figure, Axes]:
+def map_axes(model: ResettableModel, title: str) -> tuple[Figure, Axes]:
     """Return a figure whose axes show the model's walls and goal, at equal scale.
 
     Raises:
         Mismatch: the feature has fewer than two dimensions, so there is no plane to draw.
     """
     figure, axes = new_figure()
-    furnish(axes, model)
+    draw_map(axes, model)
     axes.set_title(title, fontsize=10)
     return figure, axes
 
 
-def furnish(axes: Axes, model: ResettableModel) -> None:
+def draw_map(axes: Axes, model: ResettableModel) -> None:
     """Draw the model's walls and goal into axes, at equal scale.
 
     Raises:
@@ -45,7 +45,7 @@ def furnish(axes: Axes, model: ResettableModel) -> None:
     _frame(axes, model)
 
 
-def plane(model: ResettableModel, states: Array) -> Array:
+def project_2d(model: ResettableModel, states: Array) -> Array:
     """Return where states [B, D] lie in the picture [B, 2]."""
     return model.feature(np.atleast_2d(states))[:, :2]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.figures.canvas import RED
-from pbcs_ompl.figures.maze import draw_line, legend_below, plane, stage
+from pbcs_ompl.figures.maze import draw_line, legend_below, map_axes, project_2d
 
 MOST_EDGES = 100_000
 
@@ -25,8 +25,8 @@ def tree_figure(model: ResettableModel, states: Array, parents: NDArray[np.integ
     drawn = edges[:: -(-len(edges) // MOST_EDGES)] if len(edges) > MOST_EDGES else edges
     if len(drawn) < len(edges):
         title = f"{title}\n({len(drawn):,} of {len(edges):,} edges drawn)"
-    figure, axes = stage(model, title)
-    points = plane(model, states)
+    figure, axes = map_axes(model, title)
+    points = project_2d(model, states)
     depths = depth(parents)[drawn]
     lines = LineCollection(list(np.stack([points[parents[drawn]], points[drawn]], axis=1)), array=depths,
                            cmap="winter", linewidths=0.7, zorder=1)
@@ -34,7 +34,7 @@ def tree_figure(model: ResettableModel, states: Array, parents: NDArray[np.integ
     if len(drawn):
         figure.colorbar(lines, ax=axes, shrink=0.7, pad=0.02, label="depth in the tree")
     if path is not None:
-        draw_line(axes, plane(model, path), color=RED, linewidth=1.6, zorder=4,
+        draw_line(axes, project_2d(model, path), color=RED, linewidth=1.6, zorder=4,
                   label=f"path, {len(path) - 1} steps")
     legend_below(axes)
     return figure

@@ -8,7 +8,7 @@ from gymnasium.spaces import Box
 from pbcs_ompl.core.types import Array
 
 MARGIN = 1.0
-"""What random steps have not reached is expected within so many times the range that they have."""
+"""What random steps have not reached is expected within this many times their range."""
 
 
 def feature_bounds(env: Any, steps: int) -> tuple[Array, Array, str]:
@@ -17,9 +17,9 @@ def feature_bounds(env: Any, steps: int) -> tuple[Array, Array, str]:
     Where the feature is the whole observation, and its space has finite bounds, these are taken. Else random
     steps, always the same, are made from `reset`, and the range they see is widened on both sides by itself.
     """
-    told = env.feature_box()
-    if told is not None:
-        return *told, "the environment"
+    given = env.feature_box()
+    if given is not None:
+        return *given, "the environment"
     first, _ = env.reset(seed=0)
     size = len(env.feature_dims)
     declared = _declared(env.inner.observation_space)

@@ -1,4 +1,4 @@
-"""What the mazes of gymnasium-robotics tell of themselves: extent and walls."""
+"""Extent and walls of the mazes of gymnasium-robotics."""
 
 from typing import Any
 

@@ -13,7 +13,7 @@ from pbcs_ompl.core.types import Array
 
 
 class Outcome(NamedTuple):
-    """What a step, or a reset, of a Gymnasium environment has told; rules are functions of it."""
+    """What a step, or a reset, of a Gymnasium environment has returned; rules are functions of it."""
 
     env: Any
     """The environment without wrappers, in its present state."""

@@ -1,4 +1,4 @@
-"""Which wrappers may be taken off: those below which states, actions and observations mean the same."""
+"""Which wrappers may be removed: those below which states, actions and observations mean the same."""
 
 from typing import Any
 

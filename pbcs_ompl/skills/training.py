@@ -118,7 +118,7 @@ class Training:
         """Return the plan and the transitions it took."""
         if self.path and self.resumed and (self.path / PLAN).is_file():
             trajectory = Trajectory.load(self.path / TRAJECTORY)
-            trajectory.check_belongs_to(self.model)
+            self._check_replays(trajectory)
             return trajectory, read_json(self.path / PLAN)["transitions"]
         transitions = 0
         if self.config.planner is not None:
@@ -126,15 +126,31 @@ class Training:
                          seed=self.seeds.child("plan").integer(), max_transitions=self.config.max_transitions,
                          on_progress=self._report_planning)
             trajectory, transitions = found.trajectory, found.transitions
+            if trajectory is not None and not trajectory.length:
+                raise Mismatch("the start is in the goal, so there is nothing to train")
             if self.folder:
                 config = read_toml(self.folder.path / CONFIG)
                 self.folder.write_config(config | {"planner_kwargs": found.planner_settings})
-        elif trajectory is not None and not self._reaches_goal(trajectory):
-            raise Mismatch("the trajectory does not end in the environment's goal")
+        elif trajectory is not None:
+            self._check_replays(trajectory)
+            if not self._reaches_goal(trajectory):
+                raise Mismatch("the trajectory does not end in the environment's goal")
         if self.path and trajectory is not None:
             trajectory.save(self.path / TRAJECTORY)
             write_json(self.path / PLAN, {"transitions": transitions})
         return trajectory, transitions
+
+    def _check_replays(self, trajectory: Trajectory) -> None:
+        """Refuse a trajectory of another environment; the replay also visits its states, where only those are restored.
+
+        Raises:
+            Mismatch: it belongs to another environment, or leads elsewhere in this one.
+        """
+        trajectory.check_belongs_to(self.model)
+        if not trajectory.length:
+            raise Mismatch("the trajectory has no steps: the start is in the goal, so there is nothing to train")
+        if not trajectory.replays_exactly(self.model):
+            raise Mismatch("the trajectory does not replay in this environment: its actions lead to other states")
 
     def _reaches_goal(self, trajectory: Trajectory) -> bool:
         return bool(self.model.goal_distance(trajectory.states[-1:])[0] < self.model.goal_threshold)

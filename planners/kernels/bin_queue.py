@@ -1,7 +1,7 @@
 """The memory of Ex: bins, their nodes, and how often each was expanded, with O(1) insertion and selection.
 
 Differs from [Matheron2020] Alg. 5: the hash tables W_b, B_s, B_m of lists become sorted slices of two arrays
-(see `runs`), one for the bins and one pool for the nodes of all bins. A bin's slice has room for a power of
+(see `runs`), one for the bins and one pool for the nodes of all bins. A bin's slice has space for a power of
 two of rows; when it is full it moves to a slice of twice the size, and its old slice is put into a free list for
 another bin.
 """
@@ -132,7 +132,7 @@ def add(pool: NDArray[np.int32], heads: NDArray[np.int32], number: Number, node:
 
 
 @njit(cache=True)
-def make_room_and_add(queue: BinQueue, cell: NDArray[np.int64], place: Number, node: Number) -> bool:
+def grow_and_add(queue: BinQueue, cell: NDArray[np.int64], place: Number, node: Number) -> bool:
     """Add a node where `add` could not: open its bin, or double it. Return False where an array is full."""
     number: Number = np.int64(queue.table[place]) - 1
     if number < 0:
@@ -155,7 +155,7 @@ def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.boo
             cell_of(features, done, size, cell)
             place = find_cell(cells, table, cell)
             if not (add(pool, heads, table[place] - 1, first + done)
-                    or make_room_and_add(queue, cell, place, first + done)):
+                    or grow_and_add(queue, cell, place, first + done)):
                 return done
         done += 1
     return done
@@ -163,7 +163,7 @@ def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.boo
 
 @njit(cache=True)
 def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: Number) -> Number:
-    """Open a bin at a place of the hash table; return -1 if there is no room for one."""
+    """Open a bin at a place of the hash table; return -1 if there is no space for one."""
     number = np.int64(queue.head[0, LENGTH])
     if number == len(queue.heads):
         return -1
@@ -181,7 +181,7 @@ def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: Number) -> Number:
 
 @njit(cache=True)
 def _double(queue: BinQueue, number: Number) -> bool:
-    """Move a full bin to a slice of twice the size; return whether there was room."""
+    """Move a full bin to a slice of twice the size; return whether there was space."""
     pool, heads, free = queue.pool, queue.heads, queue.free
     start, length, size = heads[number, START], heads[number, LENGTH], np.int64(heads[number, SIZE])
     moved = _take(pool, free, queue.used, size + 1)
@@ -211,7 +211,7 @@ def _take(pool: NDArray[np.int32], free: NDArray[np.int32], used: NDArray[np.int
 
 
 def _grow(queue: BinQueue) -> BinQueue:
-    """Return a queue with more room of each kind that is short."""
+    """Return a queue with more space of each kind that is short."""
     bins = queue.num_bins
     if bins == len(queue.heads):
         most = GROWTH * bins

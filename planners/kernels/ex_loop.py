@@ -11,7 +11,7 @@ from numba.extending import intrinsic
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.compiled import STEP_TYPE
-from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, make_room_and_add
+from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, grow_and_add
 from pbcs_ompl.planners.kernels.runs import MEMBER, choose, peek
 
 DONE, GOAL, FULL, NOT_FINITE = range(4)
@@ -63,7 +63,7 @@ def expand(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims:
         step, parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
         feature_dims: Dimensions of the state that are the feature [F].
         bounds: Lower and upper bounds of the controls [2, A].
-        columns: The tree's arrays, with room for B more nodes.
+        columns: The tree's arrays, with space for B more nodes.
         first: The number of nodes so far.
         queue, bin_size: The counters, and the edges of the bins [F].
 
@@ -104,6 +104,6 @@ def expand(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims:
             continue
         cell_of(features, child, bin_size, cell)
         place = find_cell(cells, places, cell)
-        if not (add(pool, heads, places[place] - 1, child) or make_room_and_add(queue, cell, place, child)):
+        if not (add(pool, heads, places[place] - 1, child) or grow_and_add(queue, cell, place, child)):
             return done, FULL
     return done, DONE

@@ -14,14 +14,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 MEMBER, COUNT, RUN = 0, 1, 2  # columns of `entries`
-START, LENGTH, LOWEST, SIZE = 0, 1, 2, 3  # columns of `heads`; SIZE (log2 of the room) is for the owner
+START, LENGTH, LOWEST, SIZE = 0, 1, 2, 3  # columns of `heads`; SIZE (log2 of the space) is for the owner
 Rows = NDArray[np.int32]
 Number = int | np.integer[Any]
 
 
 @njit(cache=True, inline="always")
 def append(entries: Rows, heads: Rows, queue: Number, member: Number) -> None:
-    """Write a member of count 0 behind those of the queue heads[queue]; there must be room."""
+    """Write a member of count 0 behind those of the queue heads[queue]; there must be space."""
     length = heads[queue, LENGTH]
     row = heads[queue, START] + length
     if length == 0:

@@ -51,10 +51,10 @@ def test_settings_survive_json_and_are_rebuilt_from_all_of_their_values(kind) ->
 
 def test_an_algorithm_that_a_preset_does_not_know_gets_its_common_values() -> None:
     class Unknown(DDPGSettings):
-        algorithm = "nobody"
+        algorithm = "unknown-algorithm"
 
     assert Unknown.from_preset("thesis").hidden == (400, 300)
-    with pytest.raises(InvalidOption, match="no settings for 'nobody'"):
+    with pytest.raises(InvalidOption, match="no settings for 'unknown-algorithm'"):
         Unknown.from_preset("thesis-chapter-4")
 
 

@@ -15,7 +15,7 @@ def ring(seeds: tuple[int, ...], capacity: int) -> Replay:
 
 
 def add(replay: Replay, numbers: np.ndarray, mask: np.ndarray | None = None) -> None:
-    """Append transitions that can be told apart by their reward."""
+    """Append transitions that differ in their reward."""
     column = numbers[..., None]
     replay.add(column, -column, numbers, column + 0.5, np.zeros_like(numbers), mask)
 

@@ -16,7 +16,7 @@ def last_json(capsys: pytest.CaptureFixture[str]) -> dict:
     return json.loads(capsys.readouterr().out.splitlines()[-1])
 
 
-def test_the_doctor_tells_what_an_environment_can_do(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_doctor_reports_what_an_environment_can_do(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(shlex.split("doctor --env MountainCarContinuous-v0 --json")) == 0
     found = last_json(capsys)["environment"]
     assert found["ok"]

@@ -99,7 +99,7 @@ def test_a_budget_that_ends_is_no_error_and_the_tree_is_kept(pbcs, tmp_path):
     assert (tmp_path / "tight/tree.png").exists()
 
 
-def test_a_training_that_runs_out_of_budget_goes_on_with_a_larger_one(pbcs):
+def test_a_training_that_runs_out_of_budget_continues_with_a_larger_one(pbcs):
     status, result, error = pbcs(f"train {MAZE} --max-transitions 1500 --out small --json")
     assert status == 1
     assert result["solved"] is False

@@ -48,7 +48,7 @@ def test_missing_library_is_named(plugins, tmp_path, monkeypatch):
     sys.modules.pop("needs_more", None)
 
 
-def test_our_own_plugins_come_through_the_door():
+def test_our_own_plugins_are_entry_points():
     assert {"Ex", "RRTNH", "RRT", "EST", "KPIECE1", "SST", "PDST"} <= set(registry.names("planner"))
     assert "ddpg" in registry.names("agent")
     registry.load_environments()

@@ -13,7 +13,7 @@ seeds = st.integers(0, 2**64)
 names = st.text(max_size=10) | st.integers(0, 2**32 - 1)
 
 
-def descend(seed, path):
+def subtree(seed, path):
     tree = SeedTree(seed)
     for name in path:
         tree = tree.child(name)
@@ -22,7 +22,7 @@ def descend(seed, path):
 
 @given(seeds, st.lists(names, max_size=3))
 def test_equal_paths_give_equal_streams(seed, path):
-    one, other = descend(seed, path), descend(seed, path)
+    one, other = subtree(seed, path), subtree(seed, path)
     other.generator()
     other.child("something else").generator().random()
     assert one.integer() == other.integer()
@@ -31,11 +31,11 @@ def test_equal_paths_give_equal_streams(seed, path):
 
 @given(seeds, st.lists(names, max_size=3))
 def test_integers_are_what_libraries_take(seed, path):
-    assert 1 <= descend(seed, path).integer() <= 2**31 - 1
+    assert 1 <= subtree(seed, path).integer() <= 2**31 - 1
 
 
 def test_different_paths_give_different_streams():
-    trees = [descend(seed, path) for seed in range(20)
+    trees = [subtree(seed, path) for seed in range(20)
              for path in ([], ["a"], ["b"], ["a", "b"], ["b", "a"], [0], [1], [0, 1], ["a", 0])]
     assert len({tree.generator().random() for tree in trees}) == len(trees)
     assert len({tree.integer() for tree in trees}) == len(trees)

@@ -65,7 +65,7 @@ def test_normalised_actions_are_ten_times_as_large() -> None:
 
 
 @pytest.mark.parametrize("normalised", [False, True])
-def test_advance_towards_arrives(normalised: bool) -> None:
+def test_advance_towards_reaches_the_target(normalised: bool) -> None:
     env = make(normalize_actions=normalised)
     states, targets = np.tile([0.5, 0.5], (3, 1)), np.array([[0.55, 0.47], [1.4, 0.6], [0.5, 0.5]])
     for _ in range(15):
@@ -146,7 +146,7 @@ def test_validity_is_bounds_and_walls() -> None:
     assert not env.is_valid(np.array(bad)).any()
 
 
-def test_a_copy_goes_its_own_way_and_arrives_at_the_same() -> None:
+def test_a_copy_is_independent_and_reaches_the_same() -> None:
     env = make(size=4, maze_seed=1)
     env.reset(options={"state": [1.5, 0.5]})
     for copied in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):

@@ -52,10 +52,10 @@ def test_segments_that_end_at_a_face(thickness: float, side: float, gap: float, 
 
 @given(st.sampled_from(THICKNESSES), at_edge, at_edge, offset, st.floats(0.01, 3.0), st.floats(0.05, 0.95))
 @settings(max_examples=150, deadline=None)
-def test_segments_that_graze_a_corner(thickness: float, right: float, up: float, gap: float, slope: float,
+def test_segments_that_graze_a_corner(thickness: float, right: float, up: float, gap: float, steepness: float,
                                       part: float) -> None:
     corner = np.array([right * (thickness / 2 + gap), up * (0.1 + gap)])
-    along = np.array([right, -up * slope]) / np.hypot(1.0, slope) * 0.1
+    along = np.array([right, -up * steepness]) / np.hypot(1.0, steepness) * 0.1
     assert_agreement(corner - part * along, corner + (1.0 - part) * along, wall(thickness))
 
 

@@ -5,18 +5,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import Mismatch, RunFolderError
 from pbcs_ompl.figures.canvas import new_figure, save
 from pbcs_ompl.figures.chain import chain_figure
 from pbcs_ompl.figures.critic import critic_figure
-from pbcs_ompl.figures.maze import plane
+from pbcs_ompl.figures.maze import project_2d
 from pbcs_ompl.figures.tree import MOST_EDGES, depth, tree_figure
 
 
-class Room:
-    """A 2x2 room with one wall and states (x, y): the parts of a model that pictures look at."""
+class Plane:
+    """A 2x2 square with one wall and states (x, y): the parts of a model that pictures look at."""
 
-    env_id = "Room"
+    spec = EnvSpec("Plane")
     state_low = feature_low = np.zeros(2)
     state_high = feature_high = np.full(2, 2.0)
     walls = np.array([[0.9, 0.0, 1.1, 1.0]])
@@ -32,7 +33,7 @@ class Room:
         return ~((states[:, 0] > 0.9) & (states[:, 0] < 1.1) & (states[:, 1] < 1.0))
 
 
-class Corridor(Room):
+class Corridor(Plane):
     """One dimension: nothing that could be drawn in a plane."""
 
     state_low = feature_low = np.zeros(1)
@@ -64,7 +65,7 @@ def test_depth_of_a_long_chain_and_of_several_roots():
 
 
 def test_tree_has_one_line_for_each_edge(walk):
-    figure = tree_figure(Room(), walk, np.arange(-1, 29), path=walk, title="a tree")
+    figure = tree_figure(Plane(), walk, np.arange(-1, 29), path=walk, title="a tree")
     (edges,) = [c for c in figure.axes[0].collections if c.get_array() is not None]
     assert len(edges.get_segments()) == 29
     assert np.array_equal(edges.get_array(), np.arange(1, 30))
@@ -73,32 +74,32 @@ def test_tree_has_one_line_for_each_edge(walk):
 
 def test_large_tree_is_thinned_and_says_so():
     count = MOST_EDGES + 10
-    figure = tree_figure(Room(), np.random.default_rng(0).uniform(0, 2, (count, 2)), np.arange(-1, count - 1))
+    figure = tree_figure(Plane(), np.random.default_rng(0).uniform(0, 2, (count, 2)), np.arange(-1, count - 1))
     assert "edges drawn" in figure.axes[0].get_title()
 
 
 def test_a_tree_without_path_and_goal_needs_no_legend(walk, recwarn):
     """An environment without a goal, and nothing found: the picture has nothing to explain."""
-    model = Room()
+    model = Plane()
     model.goal_circle = None
     tree_figure(model, walk, np.arange(-1, 29))
     assert not recwarn.list
 
 
 def test_tree_of_a_single_node_is_drawn(tmp_path, walk):
-    assert save(tree_figure(Room(), walk[:1], np.array([-1])), tmp_path / "one.png").stat().st_size > 1000
+    assert save(tree_figure(Plane(), walk[:1], np.array([-1])), tmp_path / "one.png").stat().st_size > 1000
 
 
 def test_chain_shows_each_activation_set(tmp_path, walk):
     sets = [(walk[0], 0.1), (walk[10], 0.2)]
-    figure = chain_figure(Room(), trajectory=walk, rollout=walk[::2], activations=sets, title="a chain")
+    figure = chain_figure(Plane(), trajectory=walk, rollout=walk[::2], activations=sets, title="a chain")
     circles = [patch for patch in figure.axes[0].patches if patch.get_label() != "goal"]
     assert [circle.get_radius() for circle in circles] == [0.1, 0.2]
     assert save(figure, tmp_path / "chain.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_critic_field_holds_the_values_of_the_critic(tmp_path, walk):
-    figure = critic_figure(Room(), np.ones_like, lambda o, a: o[:, 0] + 10 * o[:, 1], rollout=walk)
+    figure = critic_figure(Plane(), np.ones_like, lambda o, a: o[:, 0] + 10 * o[:, 1], rollout=walk)
     values = figure.axes[0].images[0].get_array()
     low, high = 2 / 240, 2 - 2 / 240
     assert values[0, 0] == pytest.approx(11 * low)
@@ -120,5 +121,5 @@ def test_a_failed_write_leaves_nothing_and_says_why(tmp_path):
 
 
 def test_plane_takes_one_state_or_many(walk):
-    assert np.array_equal(plane(Room(), walk[3]), walk[3:4])
-    assert np.array_equal(plane(Room(), walk), walk)
+    assert np.array_equal(project_2d(Plane(), walk[3]), walk[3:4])
+    assert np.array_equal(project_2d(Plane(), walk), walk)

@@ -69,7 +69,7 @@ def test_a_car_is_solved_and_ompl_checks_its_path(kind):
     assert len(planner.tree) - 1 <= planner.transitions
 
 
-def test_equal_seeds_give_equal_trees_and_clear_goes_on_with_the_stream():
+def test_equal_seeds_give_equal_trees_and_clear_continues_the_stream():
     trees = []
     for seed in (1, 1, 2):
         setup = car()

@@ -214,7 +214,7 @@ def test_a_model_of_another_size_is_refused(make_setup, square):
         planner.use_model(model, Counter())
 
 
-def test_clear_drops_the_tree_and_goes_on_with_the_stream(solve, square):
+def test_clear_drops_the_tree_and_continues_the_stream(solve, square):
     planner, _, counter, _ = solve(lambda si: Ex.build(si), square(goal=9.0), 300)
     first = planner.tree.states.copy()
     planner.clear()

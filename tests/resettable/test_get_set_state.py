@@ -164,7 +164,7 @@ class Forgetful(Cart):
 
 
 class Aliased(Cart):
-    """Hands out its own array, and changes it in place."""
+    """Returns its own array, and changes it in place."""
 
     def get_env_state(self) -> np.ndarray:
         return self.state

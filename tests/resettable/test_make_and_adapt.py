@@ -125,7 +125,7 @@ def test_observations_that_go_with_a_state_of_its_own(observation: gymnasium.Spa
         adapt(SpacesAndState(BOX, observation))
 
 
-def test_wrappers_of_limits_and_rewards_are_taken_off() -> None:
+def test_wrappers_of_limits_and_rewards_are_removed() -> None:
     env = wrappers.RecordEpisodeStatistics(gymnasium.make("pbcs/Maze-v0"))
     assert adapt(wrappers.TransformReward(env, lambda reward: 2 * reward)).spec.id == "pbcs/Maze-v0"
 

@@ -45,7 +45,7 @@ def test_no_valid_state_near() -> None:
         MODEL.perturb(np.array([0.5, 1.0]), 0.01, 3, np.random.default_rng(0))
 
 
-def test_rollouts_find_what_is_about_to_arrive_when_they_know_where_it_comes_from() -> None:
+def test_rollouts_from_earlier_states_find_what_leads_to_the_state() -> None:
     """A car that rolls to the left: random steps from a state lie to its left, those from before it on both sides."""
     car = make("MountainCarContinuous-v0")
     path = [car.initial_state(0)]

@@ -1,4 +1,4 @@
-"""A test can demand a solve rate, and is told why it was not reached."""
+"""A test can demand a solve rate; a failure says why it was not reached."""
 
 import pytest
 

@@ -16,7 +16,7 @@ from pbcs_ompl.resettable.maze_map import has_map, map_bounds, wall_rectangles
 from pbcs_ompl.resettable.rules import FeatureRule, Outcome, feature_rule
 
 MOVED_BY_RESET = ("body_pos", "body_quat", "site_pos", "geom_pos")
-"""Parts of a model that environments move about in `reset`: goals, doors, boards."""
+"""Parts of a model that environments move about in `reset`: goals, hinges, boards."""
 BROKEN = "4.0.0"
 """The version that computes wrong accelerations where the constraint Jacobian is sparse."""
 

@@ -22,7 +22,7 @@ from pbcs_ompl.resettable.rules import (
 )
 
 UNBOUNDED = 1e9
-"""OMPL wants finite bounds. Dimensions that nobody samples get these."""
+"""OMPL wants finite bounds. Dimensions that are not sampled get these."""
 EXPLORED_STEPS = 500
 
 
@@ -100,13 +100,13 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Reset the environment."""
         observation, info = self.inner.reset(seed=seed, options=options)
-        self._remember(Outcome(self.inner, observation, math.nan, False, info))
+        self._store(Outcome(self.inner, observation, math.nan, False, info))
         return flat(observation), info
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Make one step of the environment."""
         observation, reward, terminated, truncated, info = self.inner.step(action)
-        success = self._remember(Outcome(self.inner, observation, float(reward), bool(terminated), info))
+        success = self._store(Outcome(self.inner, observation, float(reward), bool(terminated), info))
         return flat(observation), float(reward), bool(terminated), bool(truncated), {**info, "is_success": success}
 
     def get_env_state(self) -> Array:
@@ -157,7 +157,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         """Close the environment."""
         self.inner.close()
 
-    def _remember(self, outcome: Outcome) -> bool:
+    def _store(self, outcome: Outcome) -> bool:
         """Keep feature and distance of what was reached; return whether it is a success."""
         self._head = np.asarray(self._feature_of(outcome), dtype=np.float64).reshape(-1)
         if not len(self._head):

@@ -1,7 +1,7 @@
 """Adapters for environments that can only go back to where they were: copies, and replayed actions.
 
-The saved state is a single number, which names a way from `reset(seed)`. The seed itself names the start, and a hash
-of the name before and of the action names what follows. So the same actions give the same numbers in every process,
+The saved state is a single number, a hash of the actions since `reset(seed)`: the seed stands for the start, and a
+hash of the name before and of the action for what follows. So the same actions give the same numbers in every process,
 and a trajectory found here can be replayed elsewhere.
 """
 
@@ -105,18 +105,18 @@ class ReplayedEnv(VisitedEnv):
     """
 
     def __init__(self, inner: Any, goal: Any = None, feature: Any = None):
-        self._ways: dict[float, tuple[float, Array] | None] = {}
+        self._actions: dict[float, tuple[float, Array] | None] = {}
         super().__init__(inner, goal, feature)
 
     def keep(self, name: float, before: float | None, action: Array | None) -> None:
-        """Remember the way."""
-        self._ways[name] = None if before is None or action is None else (before, np.array(action))
+        """Store the action that led here."""
+        self._actions[name] = None if before is None or action is None else (before, np.array(action))
 
     def recall(self, name: float) -> None:
-        """Go the way again."""
+        """Reset, and make the same actions again."""
         actions = []
-        while (way := self._ways[name]) is not None:
-            name, action = way
+        while (step := self._actions[name]) is not None:
+            name, action = step
             actions.append(action)
         self.inner.reset(seed=int(name))
         for action in reversed(actions):
@@ -130,7 +130,7 @@ def child_hash(name: float, action: Array) -> float:
 
 
 def copies_are_faithful(env: Any) -> bool:
-    """Try whether a deep copy in the midst of an episode continues as the original does."""
+    """Return whether a deep copy in the middle of an episode continues as the original does."""
     rng = np.random.default_rng(0)
     env.reset(seed=0)
     for _ in range(PROOF_STEPS):
@@ -168,10 +168,10 @@ def _action(env: Any, rng: np.random.Generator) -> Array:
 
 def _walk(env: Any, actions: list[Array]) -> list[bytes]:
     """Return what `env` says to each action, as bytes."""
-    told = []
+    said = []
     for action in actions:
         observation, reward, terminated, _, _ = env.step(action)
-        told.append(flat(observation).tobytes() + struct.pack("<d?", float(reward), bool(terminated)))
+        said.append(flat(observation).tobytes() + struct.pack("<d?", float(reward), bool(terminated)))
         if terminated:
             break
-    return told
+    return said

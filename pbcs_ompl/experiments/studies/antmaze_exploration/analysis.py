@@ -11,7 +11,7 @@ from pbcs_ompl.experiments.claims import FEWEST_PAIRS, SIGNIFICANCE, Claim, rate
 from pbcs_ompl.experiments.planner_statistics import censored
 from pbcs_ompl.figures.canvas import save
 from pbcs_ompl.figures.compare import distribution_figure
-from pbcs_ompl.figures.maze import stage
+from pbcs_ompl.figures.maze import map_axes
 from pbcs_ompl.resettable import make
 
 Records = list[dict[str, Any]]
@@ -83,7 +83,7 @@ def _draw_counts(record: dict[str, Any], figures: Path) -> None:
     model = make(record["env"], record["env_kwargs"])
     counts = np.array(record["counts"], dtype=float)
     outcome = "goal reached" if record["solved"] else "goal not reached"
-    figure, axes = stage(model, f"{_name(record['planner'])}, seed {record['seed']}: nodes in each bin of (x, y)\n"
+    figure, axes = map_axes(model, f"{_name(record['planner'])}, seed {record['seed']}: nodes in each bin of (x, y)\n"
                                 f"after {record['transitions']:,} transitions, {outcome}")
     low, high = model.feature_low, model.feature_high
     image = axes.imshow(np.where(counts > 0, counts, np.nan).T, origin="lower", norm=LogNorm(1, max(2.0, counts.max())),

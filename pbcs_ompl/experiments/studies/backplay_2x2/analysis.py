@@ -9,7 +9,7 @@ from matplotlib.colors import LogNorm
 from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.by_group import rates_figure
 from pbcs_ompl.figures.canvas import save
-from pbcs_ompl.figures.maze import legend_below, stage
+from pbcs_ompl.figures.maze import legend_below, map_axes
 from pbcs_ompl.resettable import make
 
 Records = list[dict[str, Any]]
@@ -98,7 +98,8 @@ def _draw_visits(record: dict[str, Any], figures: Path) -> None:
     visits = np.array(record["visits"], dtype=float)
     first = record["first_reward"][0]
     met = "the reward was never met" if first < 0 else f"the reward was met first in step {first:,}"
-    figure, axes = stage(model, f"DDPG alone, seed {record['seeds'][0]}, {record['steps']:,} steps: {met} (Fig. 5.4)")
+    title = f"DDPG alone, seed {record['seeds'][0]}, {record['steps']:,} steps: {met} (Fig. 5.4)"
+    figure, axes = map_axes(model, title)
     edges = [np.linspace(low, high, len(visits) + 1)
              for low, high in zip(model.state_low, model.state_high, strict=True)]
     mesh = axes.pcolormesh(*edges, np.where(visits > 0, visits, np.nan).T, norm=LogNorm(), cmap="Blues", zorder=1)

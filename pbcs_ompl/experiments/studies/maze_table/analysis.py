@@ -11,7 +11,7 @@ from pbcs_ompl.experiments.claims import FEWEST_PAIRS, SIGNIFICANCE, Claim, rate
 from pbcs_ompl.figures.by_group import rates_figure, values_figure
 from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED, new_figure, save
 from pbcs_ompl.figures.chain import chain_figure
-from pbcs_ompl.figures.maze import furnish, plane
+from pbcs_ompl.figures.maze import draw_map, project_2d
 from pbcs_ompl.resettable import make
 
 Records = list[dict[str, Any]]
@@ -174,16 +174,16 @@ def _draw_table(records: Records, figures: Path) -> None:
 
 def _draw_one(record: dict[str, Any], axes: Any) -> None:
     model = make("pbcs/Maze-v0", record["env_kwargs"])
-    furnish(axes, model)
+    draw_map(axes, model)
     axes.set_facecolor(COLOURS[record["solved"]])
     axes.set_xticks([])
     axes.set_yticks([])
     for key, colour, width in (("plan", RED, 0.6), ("rollout", GREEN, 1.4)):
         if record[key] is not None:
-            axes.plot(*plane(model, np.array(record[key])).T, color=colour, linewidth=width, zorder=3)
+            axes.plot(*project_2d(model, np.array(record[key])).T, color=colour, linewidth=width, zorder=3)
     for centre, radius in record["activations"]:
-        axes.add_patch(Circle(tuple(plane(model, np.array(centre))[0]), radius, fill=False, edgecolor=PURPLE, zorder=4,
-                              linewidth=0.8))
+        place = tuple(project_2d(model, np.array(centre))[0])
+        axes.add_patch(Circle(place, radius, fill=False, edgecolor=PURPLE, zorder=4, linewidth=0.8))
     axes.set_title(f"{record['label']}, {record['transitions']:,}", fontsize=9)
 
 

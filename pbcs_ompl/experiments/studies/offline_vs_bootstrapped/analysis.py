@@ -12,7 +12,7 @@ from pbcs_ompl.experiments.claims import Claim, rate
 from pbcs_ompl.figures.canvas import new_figure, save
 from pbcs_ompl.figures.critic import critic_figure
 from pbcs_ompl.figures.diagnostics import success_figure
-from pbcs_ompl.figures.maze import furnish
+from pbcs_ompl.figures.maze import draw_map
 from pbcs_ompl.resettable import make
 
 
@@ -85,7 +85,7 @@ def _draw_mini_batch(record: dict[str, Any], figures: Path) -> None:
     figure, axes = new_figure(8.4, 4.4)
     axes.remove()
     left, right = figure.subplots(1, 2)
-    furnish(left, model)
+    draw_map(left, model)
     segments = list(np.stack([before, after], axis=1))
     for panel in (left, right):
         panel.add_collection(LineCollection(segments, color="C0", linewidth=1.2, zorder=3))
