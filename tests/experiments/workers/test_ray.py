@@ -80,7 +80,7 @@ def test_a_node_with_other_versions_is_named_before_any_run(cluster, tmp_path):
 def test_what_the_docs_say_of_a_cluster_works(cluster, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RAY_ADDRESS", cluster.address)
-    page = (Path(__file__).parents[2] / "docs/execution.md").read_text()
+    page = (Path(__file__).parents[3] / "docs/execution.md").read_text()
     command, = re.findall(r"^pbcs (.*--executor ray.*)$", page, flags=re.MULTILINE)
     assert main(shlex.split(command)) == 0
     snippet, = re.findall(r"^```py\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)

@@ -61,9 +61,11 @@ def test_a_training(laboratory, call, name):
     folder = Path("runs") / name
     (environment,), options = call(repeating(read_folder(folder)))
     trajectory = options.pop("trajectory")
-    config = TrainConfig(**{key: value for key, value in options.items()
-                            if key in TrainConfig.__dataclass_fields__})
-    assert vars(config) | {"kind": "train", "environment": environment.to_dict()} == settings(folder)
+    chosen = {key: value for key, value in options.items() if key not in ("out", "on_progress")}
+    defaults = {"max_transitions": 10_000_000}
+    config = TrainConfig.resolve(planned=trajectory is not None, **defaults | chosen)
+    resolved = {name: value for name, value in config.to_dict().items() if value is not None}
+    assert resolved | {"kind": "train", "environment": environment.to_dict()} == settings(folder)
     assert (trajectory is not None) == (name == "given")
 
 
