@@ -24,7 +24,7 @@ COLUMNS_TYPE = types.NamedTuple(
 """Numba's type of `pbcs_ompl.core.tree.Columns`."""
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def prefetch(typing_context: Any, array: Any, row: Any) -> Any:
     """Fetch the first cache line of array[row] of a two-dimensional array into the cache; changes no value."""
     signature = types.void(array, types.intp)

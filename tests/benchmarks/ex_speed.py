@@ -8,8 +8,8 @@
    (bar: 110).
 3. Ten 9x9 mazes: median wall time to the first solution of Ex and of OMPL's planners. These get the plain problem, and
    the goal as a GoalState, so that those with a goal bias know where it is. Bar: 1/50 of the fastest at OMPL's default
-   projection (cells of 1/20 of the extent). Beside it, OMPL's planners with projection cells as small as
-   Ex's bins, which helps them.
+   projection (cells of 1/20 of the extent). Beside it, OMPL's planners with projection cells as small as Ex's bins,
+   which they profit from.
 """
 
 import argparse

@@ -16,6 +16,7 @@ class Square:
     def __init__(self, size: int = 2, feature_dims: tuple[int, ...] | None = (0, 1), goal: float = 4.5,
                  radius: float = 0.5, start: tuple[float, float] = (0.5, 0.5)):
         self.spec = EnvSpec("square", {"size": size, "list": (1, 2)})
+        self.env = None  # the model is the whole environment
         self.capabilities = frozenset({"visited", "arbitrary", "exact"})
         self.where = [0, 1] if feature_dims is None else list(feature_dims)
         self.state_low, self.state_high = np.zeros(size), np.full(size, 1e6)

@@ -28,7 +28,7 @@ def _compiled(reals, table, integers, states, parent, controls, child):
 class Square:
     """s' = s + a within [0, extent]^2, else s' = s; success within `radius` of (goal, goal), maximum norm."""
 
-    spec, capabilities = EnvSpec("tests/Square"), frozenset({"visited", "arbitrary", "exact"})
+    env, spec, capabilities = None, EnvSpec("tests/Square"), frozenset({"visited", "arbitrary", "exact"})
     observation_size, max_episode_steps, parallel_batch = 2, 50, 1
     walls, goal_circle = np.empty((0, 4)), None
     feature_dims: tuple[int, ...] | None = (0, 1)
