@@ -3,13 +3,14 @@
 from pathlib import Path
 
 import gymnasium
+import mujoco
 import numpy as np
 from gymnasium.spaces import Box
 
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.envs.maze.layout import MazeLayout
-from pbcs_ompl.envs.mujoco_env import FAR, FAST, BatchedMujocoEnv, mujoco
+from pbcs_ompl.envs.mujoco_env import FAR, FAST, BatchedMujocoEnv
 from pbcs_ompl.envs.walls_fcl import WallsFcl
 
 ANT = Path(gymnasium.__file__).parent / "envs/mujoco/assets/ant.xml"

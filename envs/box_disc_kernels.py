@@ -53,7 +53,8 @@ def compiled_step_in_box(settings: Array, table: Array, integers: IndexArray, st
 @njit(cache=True)
 def _inside(settings: Array, x: float, y: float) -> bool:
     dx, dy = x - settings[DISC_X], y - settings[DISC_Y]
-    return dx * dx + dy * dy <= settings[DISC_RADIUS] * settings[DISC_RADIUS]
+    inside: bool = dx * dx + dy * dy <= settings[DISC_RADIUS] * settings[DISC_RADIUS]
+    return inside
 
 
 @njit(cache=True)

@@ -102,7 +102,8 @@ class LineEnv(gymnasium.Env[Array, Array]):
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, 1] lie on the line [B]."""
         position = np.asarray(states)[:, 0]
-        return (position >= self.state_low[0]) & (position <= HIGH)
+        inside: BoolArray = (position >= self.state_low[0]) & (position <= HIGH)
+        return inside
 
     def advance_towards(self, states: Array, targets: Array) -> Array:
         """Return the controls [B, 1] from states [B, 1] straight to targets [B, 1], clipped to the box."""

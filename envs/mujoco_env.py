@@ -89,7 +89,8 @@ class BatchedMujocoEnv(gymnasium.Env[Array, Array], ABC):
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, D] are within the bounds [B]."""
         states = np.asarray(states)
-        return np.logical_and.reduce((states >= self.state_low) & (states <= self.state_high), axis=1)
+        inside: BoolArray = np.logical_and.reduce((states >= self.state_low) & (states <= self.state_high), axis=1)
+        return inside
 
     def distance(self, states: Array, others: Array) -> Array:
         """Return the lengths [B] of MuJoCo's differences of positions, in which turns of a free joint are angles."""
@@ -98,7 +99,8 @@ class BatchedMujocoEnv(gymnasium.Env[Array, Array], ABC):
         positions = slice(1, 1 + self._nq)
         for row, state, other in zip(rows, states, others, strict=True):
             mujoco.mj_differentiatePos(self.model, row, 1.0, other[positions].copy(), state[positions].copy())
-        return np.linalg.norm(rows, axis=1)
+        lengths: Array = np.linalg.norm(rows, axis=1)
+        return lengths
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Begin at the model's initial position with noise, or at `options["state"]`.

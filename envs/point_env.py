@@ -94,7 +94,8 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
     def in_bounds(self, states: Array) -> BoolArray:
         """Return which states [B, 2] lie in [0, extent]^2 [B]."""
         inside = (np.asarray(states) >= self.state_low) & (np.asarray(states) <= self.state_high)
-        return np.logical_and.reduce(inside, axis=1)
+        both: BoolArray = np.logical_and.reduce(inside, axis=1)
+        return both
 
     @property
     def walls(self) -> Array:
@@ -142,7 +143,8 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
     def displacements(self, controls: Array) -> Array:
         """Return how far controls [B, 2] move the point [B, 2], as the kernels compute it."""
         limit = self.settings[point_kernels.LIMIT]
-        return np.clip(controls, -limit, limit) * self.settings[point_kernels.SCALE]
+        moved: Array = np.clip(controls, -limit, limit) * self.settings[point_kernels.SCALE]
+        return moved
 
     def get_env_state(self) -> Array:
         """Return the position [2]."""
@@ -167,7 +169,8 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
     def advance_towards(self, states: Array, targets: Array) -> Array:
         """Return the controls [B, 2] from states [B, 2] straight to targets [B, 2], clipped to the box."""
         limit = self.settings[point_kernels.LIMIT]
-        return np.clip((np.asarray(targets) - states) / self.settings[point_kernels.SCALE], -limit, limit)
+        controls: Array = np.clip((np.asarray(targets) - states) / self.settings[point_kernels.SCALE], -limit, limit)
+        return controls
 
     def render(self) -> Any:
         """Return the picture as an array [height, width, 3] of uint8, for "rgb_array"."""

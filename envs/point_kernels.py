@@ -22,13 +22,15 @@ def displacement(settings: Array, a: float) -> float:
         a = limit
     elif a < -limit:
         a = -limit
-    return a * settings[SCALE]
+    moved: float = a * settings[SCALE]
+    return moved
 
 
 @njit(cache=True)
 def _distance(settings: Array, x: float, y: float) -> float:
     dx, dy = x - settings[GOAL_X], y - settings[GOAL_Y]
-    return np.sqrt(dx * dx + dy * dy)
+    length: float = np.sqrt(dx * dx + dy * dy)
+    return length
 
 
 @njit(cache=True)

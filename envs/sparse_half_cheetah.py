@@ -3,11 +3,12 @@
 from pathlib import Path
 
 import gymnasium
+import mujoco
 import numpy as np
 from gymnasium.spaces import Box
 
 from pbcs_ompl.core.types import Array, BoolArray
-from pbcs_ompl.envs.mujoco_env import FAR, FAST, BatchedMujocoEnv, mujoco
+from pbcs_ompl.envs.mujoco_env import FAR, FAST, BatchedMujocoEnv
 
 CHEETAH = Path(gymnasium.__file__).parent / "envs/mujoco/assets/half_cheetah.xml"
 FAST_ENOUGH = 2.0

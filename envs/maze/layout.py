@@ -40,7 +40,7 @@ class MazeLayout:
     @property
     def size(self) -> int:
         """Number of cells along each axis."""
-        return self.horizontal.shape[0]
+        return len(self.horizontal)
 
     @classmethod
     def from_size(cls, size: int, maze_seed: int = 0) -> "MazeLayout":

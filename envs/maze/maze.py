@@ -79,7 +79,8 @@ class MazeEnv(PointEnv):
         """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
         if self.collision == "fcl":
             after, _ = self.move(np.array([state]), np.array([control]))
-            return after[0].tolist()
+            following: list[float] = after[0].tolist()
+            return following
         rectangles, lists, _ = self._grid
         x, y = state
         a, b = control

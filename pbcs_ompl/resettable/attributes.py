@@ -115,6 +115,6 @@ def misspelt(env: Any) -> dict[str, str]:
     return found
 
 
-def _require(name: str, value: Any, holds: bool, expected: str) -> None:
+def _require(name: str, value: Any, holds: Any, expected: str) -> None:
     if not holds:
         raise InvalidOption(f"the environment's {name} is {value!r}; expected {expected}")

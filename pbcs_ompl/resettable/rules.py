@@ -77,7 +77,8 @@ def goal_rule(rule: str) -> GoalRule:
         InvalidOption: the rule does not parse.
     """
     if ":" in rule and "[" not in rule:
-        return _imported("goal", rule)
+        goal: GoalRule = _imported("goal", rule)
+        return goal
     for symbol, compare in COMPARISONS.items():
         left, found, right = rule.partition(symbol)
         if found:
@@ -96,7 +97,8 @@ def feature_rule(rule: str) -> FeatureRule:
         InvalidOption: the rule does not parse.
     """
     if ":" in rule and "[" not in rule:
-        return _imported("feature", rule)
+        feature: FeatureRule = _imported("feature", rule)
+        return feature
     parts = [_parse_part("feature", rule, text) for text in rule.split(",")]
     return lambda outcome: np.concatenate([part(outcome) for part in parts])
 

@@ -36,13 +36,13 @@ class MujocoEnv(RestorableEnv):
     def __init__(self, inner: Any, goal: Any = None, feature: Any = None):
         import mujoco
 
-        self._mujoco = mujoco
+        self._mujoco: Any = mujoco  # its functions have no types
         self._kinds = _state_kinds(mujoco, inner.model)
-        self._physics = int(mujoco.mj_stateSize(inner.model, self._kinds))
+        self._physics = int(self._mujoco.mj_stateSize(inner.model, self._kinds))
         self._parts, self._has_goal = _moved_parts(inner)
         self._loaded = False
         self.goal_radius = float(getattr(inner, "distance_threshold", MAZE_GOAL_RADIUS))
-        if mujoco.__version__ == BROKEN and mujoco.mj_isSparse(inner.model):
+        if mujoco.__version__ == BROKEN and self._mujoco.mj_isSparse(inner.model):
             warnings.warn(f"mujoco {BROKEN} computes wrong accelerations for this model, whose constraint Jacobian is "
                           f"sparse; install mujoco 4.0.1 or newer, or 3.x", stacklevel=2)
         super().__init__(inner, goal, feature)

@@ -147,7 +147,8 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         if saved.shape[1] == 0:
             extent = self.state_high[:features] - self.state_low[:features]
             saved = (states[:, :features] - others[:, :features]) * (2.0 / extent)
-        return np.linalg.norm(saved, axis=1)
+        lengths: Array = np.linalg.norm(saved, axis=1)
+        return lengths
 
     def render(self) -> Any:
         """Render the environment."""

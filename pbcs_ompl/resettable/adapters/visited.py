@@ -163,7 +163,8 @@ def check_replays(env: Any) -> None:
 
 
 def _action(env: Any, rng: np.random.Generator) -> Array:
-    return rng.uniform(env.action_space.low, env.action_space.high).astype(env.action_space.dtype)
+    action: Array = rng.uniform(env.action_space.low, env.action_space.high).astype(env.action_space.dtype)
+    return action
 
 
 def _walk(env: Any, actions: list[Array]) -> list[bytes]:

@@ -1,6 +1,8 @@
 """The command that a report prints repeats the run: parsed, it has the settings of the folder's config.toml."""
 
 import shlex
+import tomllib
+from inspect import signature
 from pathlib import Path
 
 import pytest
@@ -60,13 +62,12 @@ def test_a_plan(laboratory, call):
 def test_a_training(laboratory, call, name):
     folder = Path("runs") / name
     (environment,), options = call(repeating(read_folder(folder)))
-    trajectory = options.pop("trajectory")
-    chosen = {key: value for key, value in options.items() if key not in ("out", "on_progress")}
-    defaults = {"max_transitions": 10_000_000}
-    config = TrainConfig.resolve(planned=trajectory is not None, **defaults | chosen)
-    resolved = {name: value for name, value in config.to_dict().items() if value is not None}
-    assert resolved | {"kind": "train", "environment": environment.to_dict()} == settings(folder)
-    assert (trajectory is not None) == (name == "given")
+    planned = options.pop("trajectory") is not None
+    choices = {name: value for name, value in options.items() if name in signature(TrainConfig.resolve).parameters}
+    config = TrainConfig.resolve(**choices, planned=planned)
+    again = {"kind": "train", **config.to_dict(), "environment": environment.to_dict()}
+    assert tomllib.loads(to_toml(again)) == settings(folder)
+    assert planned == (name == "given")
 
 
 def test_an_evaluation(laboratory, call):
