@@ -8,16 +8,16 @@ from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 
 
-def describe(model: Any) -> dict[str, Any]:
+def describe(model: ResettableModel) -> dict[str, Any]:
     """Return adapter, capabilities, size of the state, and feature and goal as sentences."""
-    env = getattr(model, "env", None)
+    env = model.env
     return {"adapter": type(env).__name__, "capabilities": sorted(model.capabilities),
             "state_size": len(model.state_low), "feature": feature_words(model), "goal": goal_words(model)}
 
 
 def feature_words(model: ResettableModel) -> str:
     """Return what is explored, within which bounds, and where these come from."""
-    env = getattr(model, "env", None)
+    env = model.env
     rule = model.spec.feature or "the adapter's choice"
     source = f", from {env.bounds_from}" if isinstance(env, RestorableEnv) else ""
     return f"{rule}: {_vector(model.feature_low)} to {_vector(model.feature_high)}{source}"
@@ -31,7 +31,7 @@ def goal_words(model: ResettableModel) -> str:
 
 def note_rules(model: ResettableModel) -> None:
     """Print on stderr what is explored and what is a success where an adapter, not the environment, decides it."""
-    if isinstance(getattr(model, "env", None), RestorableEnv):
+    if isinstance(model.env, RestorableEnv):
         print(f"feature   {feature_words(model)}\ngoal      {goal_words(model)}", file=sys.stderr)
 
 

@@ -7,12 +7,14 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from numpy.typing import NDArray
 
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, NotResettable
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.rendering import check_can_render
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv
 from pbcs_ompl.results.files import write_atomically
 
 KINDS = (".mp4", ".gif")
@@ -59,11 +61,10 @@ def write_video(model: ResettableModel, states: Array, path: str | Path) -> Path
     return path
 
 
-def _frames(model: ResettableModel, states: Array) -> Iterator[Array]:
+def _frames(model: ResettableModel, states: Array) -> Iterator[NDArray[np.uint8]]:
     """Yield an image [H, W, 3] of each state."""
-    stage: Any = make(replace(model.spec, kwargs={**model.spec.kwargs, "render_mode": "rgb_array"}))
-    env = stage.env
-    if hasattr(env, "inner") and hasattr(env.inner, "data"):
+    env = make(replace(model.spec, kwargs={**model.spec.kwargs, "render_mode": "rgb_array"})).env
+    if isinstance(env, MujocoEnv):
         check_can_render()
     for state in states:
         env.set_env_state(np.array(state))
@@ -77,8 +78,8 @@ def _frames(model: ResettableModel, states: Array) -> Iterator[Array]:
     env.close()
 
 
-def _rate(model: Any) -> int:
-    return int(getattr(model.env, "metadata", {}).get("render_fps", FRAMES_A_SECOND))
+def _rate(model: ResettableModel) -> int:
+    return int(model.env.metadata.get("render_fps", FRAMES_A_SECOND))
 
 
 def _imageio() -> Any:
