@@ -88,17 +88,18 @@ class MLP:
         chosen = torch.tensor(members, device=flat.device)
         return torch.cat([block[chosen].flatten() for layer in self.split(flat) for block in layer.tensors()])
 
-    def initial(self, generators: Sequence[torch.Generator]) -> Tensor:
-        """Draw parameters [S * P] as torch.nn.Linear does, each seed's from its own generator.
+    def initial(self, generators: Sequence[np.random.Generator]) -> Tensor:
+        """Draw parameters [S * P] from the distribution of torch.nn.Linear, each seed's from its own generator.
 
-        Weights and biases are uniform in +-1/sqrt(number of inputs).
+        Weights and biases are uniform in +-1/sqrt(number of inputs). Generators are NumPy's: torch's use 32 bits of
+        their seed on a CPU, too few for stacks of many seeds.
         """
         flat = torch.empty(len(generators) * self.num_parameters)
         for layer in self.split(flat):
             bound = layer.weight.shape[1] ** -0.5
             for weight, bias, generator in zip(layer.weight, layer.bias, generators, strict=True):
-                weight.uniform_(-bound, bound, generator=generator)
-                bias.uniform_(-bound, bound, generator=generator)
+                weight.copy_(torch.from_numpy(generator.uniform(-bound, bound, weight.shape)))
+                bias.copy_(torch.from_numpy(generator.uniform(-bound, bound, bias.shape)))
             if layer.norm is not None:
                 layer.norm.gain.fill_(1.0)
                 layer.norm.shift.zero_()
@@ -152,7 +153,7 @@ class TrainedNetwork:
         mean, square: Adam's moments [S * P].
     """
 
-    def __init__(self, network: MLP, generators: Sequence[torch.Generator], device: torch.device):
+    def __init__(self, network: MLP, generators: Sequence[np.random.Generator], device: torch.device):
         self.network = network
         initial = network.initial(generators).to(device)
         self.weights = Weights(network, initial)

@@ -60,7 +60,7 @@ class SAC(StackedAgent):
     outputs_per_action = 2
     num_critics = 2
 
-    def make_networks(self, generators: Sequence[torch.Generator]) -> dict[str, TrainedNetwork | TrainedScalar]:
+    def make_networks(self, generators: Sequence[np.random.Generator]) -> dict[str, TrainedNetwork | TrainedScalar]:
         """Return actor, critics, and the logarithm of the temperature."""
         initial = torch.full((len(self.seeds),), log(self.settings.temperature))
         self.log_temperature = TrainedScalar(initial, self.device)

@@ -90,13 +90,12 @@ class StackedAgent(ABC):
         self.box = ActionBox(self.tensor((self.action_high - self.action_low) / 2.0),
                              self.tensor((self.action_high + self.action_low) / 2.0))
         self.stream_keys = stream_keys(self.seeds, "updates")
-        numbers = [SeedTree(seed).child("weights").integer() for seed in self.seeds]
-        self._trained = self.make_networks([torch.Generator().manual_seed(number) for number in numbers])
+        self._trained = self.make_networks([SeedTree(seed).child("weights").generator() for seed in self.seeds])
         self.replay = Replay(observation_size, self.action_size, seeds=self.seeds,
                              capacity=self.settings.replay_capacity, device=self.device)
         self._run_update = compiled(self._update_rows, compile, self.device, record=not self.gradients)
 
-    def make_networks(self, generators: Sequence[torch.Generator]) -> dict[str, TrainedNetwork | TrainedScalar]:
+    def make_networks(self, generators: Sequence[np.random.Generator]) -> dict[str, TrainedNetwork | TrainedScalar]:
         """Return all that is trained, by name; an algorithm that trains more than actor and critic adds to it."""
         hidden, norm = self.settings.hidden, self.settings.layer_norm
         actor = MLP((self.observation_size, *hidden, self.outputs_per_action * self.action_size), norm)

@@ -29,6 +29,10 @@ class SeedTree:
         """Return this node's seed as an integer in [1, 2**31 - 1], for libraries that want one."""
         return int(self._sequence.generate_state(1)[0]) % (2**31 - 1) + 1
 
+    def integer64(self) -> int:
+        """Return this node's seed as an integer in [0, 2**64 - 1], for streams of which there are many."""
+        return int(self._sequence.generate_state(1, np.uint64)[0])
+
     def generator(self) -> np.random.Generator:
         """Return a NumPy generator of this node's stream."""
         return np.random.Generator(np.random.PCG64(self._sequence))

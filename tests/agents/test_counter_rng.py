@@ -34,6 +34,19 @@ def test_names_and_seeds_give_different_streams() -> None:
     assert len({stream.tobytes() for stream in streams}) == 4
 
 
+@pytest.mark.parametrize("name", ["replay", "updates", "samples"])
+def test_the_keys_of_100_000_seeds_are_distinct(name) -> None:
+    """With 31 bits, two of 30,000 seeds had the same "replay" stream."""
+    keys = stream_keys(range(100_000), name)
+    assert len(np.unique(keys)) == len(keys)
+    assert keys.max() > 2**63  # all 64 bits are used
+
+
+def test_keys_of_64_bits_give_different_streams() -> None:
+    keys = stream_keys(range(2_000), "replay")
+    assert len(np.unique(uniform(keys, 0, 1, (4,)), axis=1)[0]) == 2_000
+
+
 def test_uniform_numbers_stay_below_one() -> None:
     numbers = uniform(stream_keys((0,), "a"), 0, 1, (3_000_000,))
     assert numbers.min() >= 0.0

@@ -19,7 +19,7 @@ CPU = torch.device("cpu")
 
 
 def network(outputs: int, *seeds: int, inputs: int = 3, layer_norm: bool = False) -> TrainedNetwork:
-    generators = [torch.Generator().manual_seed(seed) for seed in seeds]
+    generators = [np.random.default_rng(seed) for seed in seeds]
     return TrainedNetwork(MLP((inputs, 16, 12, outputs), layer_norm), generators, CPU)
 
 
@@ -121,7 +121,7 @@ def row_losses(loss: object, trained, rest: list, seed: int) -> list[float]:
     weights, count = rest[0], rest[0].layers[0].weight.shape[0] // SEEDS
     critics = []
     for index in range(seed, count * SEEDS, SEEDS):
-        stand_in = TrainedNetwork(weights.network, [torch.Generator()] * count * SEEDS, CPU)
+        stand_in = TrainedNetwork(weights.network, [np.random.default_rng()] * count * SEEDS, CPU)
         stand_in.weights.flat.copy_(weights.flat)
         critics.append(numpy_network(stand_in, index))
     if loss is losses.policy_loss:

@@ -11,8 +11,8 @@ from pbcs_ompl.agents.networks import MLP, TrainedNetwork, Weights, adam_rates
 CPU = torch.device("cpu")
 
 
-def generators(*seeds: int) -> list[torch.Generator]:
-    return [torch.Generator().manual_seed(seed) for seed in seeds]
+def generators(*seeds: int) -> list[np.random.Generator]:
+    return [np.random.default_rng(seed) for seed in seeds]
 
 
 def reference(network: MLP, flat: torch.Tensor, inputs: torch.Tensor) -> torch.Tensor:

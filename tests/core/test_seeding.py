@@ -34,6 +34,12 @@ def test_integers_are_what_libraries_take(seed, path):
     assert 1 <= subtree(seed, path).integer() <= 2**31 - 1
 
 
+@given(seeds, st.lists(names, max_size=3))
+def test_long_integers_have_64_bits(seed, path):
+    assert 0 <= descend(seed, path).integer64() <= 2**64 - 1
+    assert descend(seed, path).integer64() == descend(seed, path).integer64()
+
+
 def test_different_paths_give_different_streams():
     trees = [subtree(seed, path) for seed in range(20)
              for path in ([], ["a"], ["b"], ["a", "b"], ["b", "a"], [0], [1], [0, 1], ["a", 0])]

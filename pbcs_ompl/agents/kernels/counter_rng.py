@@ -13,8 +13,8 @@ Numbers = NDArray[np.float32]
 
 
 def stream_keys(seeds: Sequence[int], name: str) -> Keys:
-    """Return one key [S] for each seed and this name."""
-    return np.array([SeedTree(seed).child(name).integer() for seed in seeds], dtype=np.uint64)
+    """Return one key of 64 bits [S] for each seed and this name."""
+    return np.array([SeedTree(seed).child(name).integer64() for seed in seeds], dtype=np.uint64)
 
 
 def uniform(keys: Keys, first: int, count: int, shape: tuple[int, ...]) -> Numbers:
