@@ -9,8 +9,8 @@ ENTRY_POINTS = {
     "pbcs/Maze-v0": "pbcs_ompl.envs.maze.maze:MazeEnv",
     "pbcs/Box-v0": "pbcs_ompl.envs.box_disc:BoxEnv",
     "pbcs/Disc-v0": "pbcs_ompl.envs.box_disc:DiscEnv",
-    "pbcs/Toy1D-v0": "pbcs_ompl.envs.toy_1d:Toy1DEnv",
-    "pbcs/Drift-v0": "pbcs_ompl.envs.drift:DriftEnv",
+    "pbcs/Toy1D-v0": "pbcs_ompl.envs.line_env:Toy1DEnv",
+    "pbcs/Drift-v0": "pbcs_ompl.envs.line_env:DriftEnv",
     "pbcs/AntMaze-v0": "pbcs_ompl.envs.ant_maze:AntMazeEnv",
     "pbcs/SparseHalfCheetah-v0": "pbcs_ompl.envs.sparse_half_cheetah:SparseHalfCheetahEnv",
 }

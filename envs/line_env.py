@@ -1,4 +1,4 @@
-"""A point that moves on a line: what 1D-Toy and Drift have in common."""
+"""A point that moves on a line: 1D-Toy and Drift, `pbcs/Toy1D-v0` and `pbcs/Drift-v0`."""
 
 from typing import Any, ClassVar
 
@@ -108,3 +108,29 @@ class LineEnv(gymnasium.Env[Array, Array]):
     def advance_towards(self, states: Array, targets: Array) -> Array:
         """Return the controls [B, 1] from states [B, 1] straight to targets [B, 1], clipped to the box."""
         return np.clip(np.asarray(targets) - states, -MAX_STEP, MAX_STEP)
+
+
+class Toy1DEnv(LineEnv):
+    """S = [0, 1], A = [-0.1, 0.1], start 0; reward 1 and the end of the episode when s + a < 0.
+
+    Source: [Matheron2020] 6.2.1, Fig. 6.1. Differs: there a rewarded step leads to the state 0, the start; here it
+    leads to s + a, so that success is a function of the state. No agent learns from what follows a terminal
+    transition.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(low=-MAX_STEP)
+
+
+class DriftEnv(LineEnv):
+    """S = [0, 1], A = [-0.1, 0.1], start 0; no transition is rewarded or terminal.
+
+    Source: [Matheron2020] 6.3.1. Differs: none.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(low=0.0)
+
+    def goal_distance(self, states: Array) -> Array:
+        """Return the distances [B] of states [B, 1] to the goal: infinite, there is none."""
+        return np.full(len(states), np.inf)

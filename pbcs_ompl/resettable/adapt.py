@@ -18,8 +18,7 @@ from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
 from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, check_replays, copies_are_faithful
 from pbcs_ompl.resettable.attributes import EnvAttributes, misspelt
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
-from pbcs_ompl.resettable.spaces import check_actions, check_flattenable, check_observations
-from pbcs_ompl.resettable.wrappers import unwrap
+from pbcs_ompl.resettable.supported import check_actions, check_flattenable, check_observations, unwrap
 
 HOW_TO = (
     "implement `get_env_state() -> array [D]` and `set_env_state(array)` beside `step` (simple), or the "

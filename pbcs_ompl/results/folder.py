@@ -3,10 +3,12 @@
 import os
 import tomllib
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.results.files import (
@@ -20,7 +22,6 @@ from pbcs_ompl.results.files import (
     write_json,
     write_toml,
 )
-from pbcs_ompl.results.lock import lock
 from pbcs_ompl.results.provenance import provenance
 
 KINDS = ("plan", "train", "eval", "compare", "study")
@@ -206,3 +207,31 @@ def _provenance(path: Path, config: dict[str, Any]) -> list[dict[str, str]]:
     if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
         raise DamagedFile(f"{path / PROVENANCE} is damaged: expected a list of JSON objects")
     return found
+
+
+POLL_SECONDS = 0.01
+
+
+@contextmanager
+def lock(path: Path, *, wait: bool = False) -> Iterator[None]:
+    """Hold a lock file, which exists as long as it is held.
+
+    Args:
+        path: The file.
+        wait: Wait until no other process holds it.
+
+    Raises:
+        RunFolderError: another process holds it.
+        OSError: the file cannot be written, or its disk supports no locks.
+    """
+    file = FileLock(path, thread_local=False, poll_interval=POLL_SECONDS, fallback_to_soft=False)
+    try:
+        file.acquire(timeout=-1 if wait else 0)
+    except Timeout as error:
+        raise RunFolderError(f"{path.parent} is in use by another process; wait until it ends, or choose another "
+                             "--out") from error
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)  # before the release: FileLock refuses a file that was removed meanwhile
+        file.release()

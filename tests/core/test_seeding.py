@@ -36,8 +36,8 @@ def test_integers_are_what_libraries_take(seed, path):
 
 @given(seeds, st.lists(names, max_size=3))
 def test_long_integers_have_64_bits(seed, path):
-    assert 0 <= descend(seed, path).integer64() <= 2**64 - 1
-    assert descend(seed, path).integer64() == descend(seed, path).integer64()
+    assert 0 <= subtree(seed, path).integer64() <= 2**64 - 1
+    assert subtree(seed, path).integer64() == subtree(seed, path).integer64()
 
 
 def test_different_paths_give_different_streams():

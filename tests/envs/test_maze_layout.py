@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.envs.maze.generate import passages_of, recursive_backtracker
-from pbcs_ompl.envs.maze.layout import MazeLayout
+from pbcs_ompl.envs.maze.layout import MazeLayout, passages_of, recursive_backtracker
 
 
 @given(size=st.integers(2, 12), seed=st.integers(0, 2**31))

@@ -8,12 +8,12 @@ import time
 import pytest
 
 from pbcs_ompl.core.errors import RunFolderError
-from pbcs_ompl.results.lock import lock
+from pbcs_ompl.results.folder import lock
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from pbcs_ompl.results.lock import lock
+from pbcs_ompl.results.folder import lock
 with lock(Path(sys.argv[1])):
     print("mine", flush=True)
     time.sleep(60)

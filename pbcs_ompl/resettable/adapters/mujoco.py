@@ -12,7 +12,6 @@ from pbcs_ompl.core.errors import InvalidState, MissingDependency, NotResettable
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel, Step
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
-from pbcs_ompl.resettable.maze_map import has_map, map_bounds, wall_rectangles
 from pbcs_ompl.resettable.rules import FeatureRule, Outcome, feature_rule
 
 MOVED_BY_RESET = ("body_pos", "body_quat", "site_pos", "geom_pos")
@@ -212,3 +211,22 @@ def check_observes(env: Any) -> None:
     if not callable(getattr(env, "_get_obs", None)):
         raise NotResettable(f"{type(env).__name__} has no `_get_obs()`, so a restored state cannot be observed; "
                               f"add it, or get_env_state and set_env_state")
+
+
+def has_map(env: Any) -> bool:
+    """Return whether `env` is a maze of gymnasium-robotics."""
+    return hasattr(getattr(env, "maze", None), "maze_map")
+
+
+def map_bounds(maze: Any) -> tuple[Array, Array]:
+    """Return the corners (x, y) of the map."""
+    high = np.array([maze.x_map_center, maze.y_map_center], dtype=np.float64)
+    return -high, high
+
+
+def wall_rectangles(maze: Any) -> Array:
+    """Return the cells that are walls [W, 4] (x0, y0, x1, y1)."""
+    half = maze.maze_size_scaling / 2
+    centres = [maze.cell_rowcol_to_xy(np.array([row, column])) for row, cells in enumerate(maze.maze_map)
+               for column, cell in enumerate(cells) if cell == 1]
+    return np.array([[x - half, y - half, x + half, y + half] for x, y in centres], dtype=np.float64).reshape(-1, 4)
