@@ -2,6 +2,8 @@
 
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -149,7 +151,9 @@ class Training:
         trajectory.check_belongs_to(self.model)
         if not trajectory.length:
             raise Mismatch("the trajectory has no steps: the start is in the goal, so there is nothing to train")
-        if not trajectory.replays_exactly(self.model):
+        with _named_failures("replaying the trajectory"):
+            same = trajectory.replays_exactly(self.model)
+        if not same:
             raise Mismatch("the trajectory does not replay in this environment: its actions lead to other states")
 
     def _reaches_goal(self, trajectory: Trajectory) -> bool:
@@ -181,21 +185,14 @@ class Training:
                     self._checkpoint(method)
                     return (f"the budget of {self.config.max_transitions} transitions is used up, with "
                             f"{method.covered:.0%} of the plan covered")
-                self._step(method)
+                with _named_failures("training"):
+                    method.step()
                 self._report(method)
                 if stop.is_set() or time.perf_counter() - self.last_checkpoint > CHECKPOINT_SECONDS:
                     self._checkpoint(method)
                 if stop.is_set():
                     raise KeyboardInterrupt
         return None
-
-    def _step(self, method: TrainingMethod) -> None:
-        try:
-            method.step()
-        except PbcsError:
-            raise
-        except Exception as error:
-            raise CallbackFailed(f"the environment or the agent raised while training: {error!r}") from error
 
     def _checkpoint(self, method: TrainingMethod) -> None:
         if self.path:
@@ -247,6 +244,17 @@ class Training:
         except KeyboardInterrupt:  # a caller may end a training from here
             self._checkpoint(method)
             raise
+
+
+@contextmanager
+def _named_failures(doing: str) -> Iterator[None]:
+    """Turn an exception of the environment or of the agent into a CallbackFailed."""
+    try:
+        yield
+    except PbcsError:
+        raise
+    except Exception as error:
+        raise CallbackFailed(f"the environment or the agent raised while {doing}: {error!r}") from error
 
 
 def training_versions() -> dict[str, str]:

@@ -217,12 +217,18 @@ def test_folders_are_never_overwritten_and_damage_is_named(tmp_path):
         resume(tmp_path / "run")
 
 
-def test_an_exception_of_the_environment_is_named():
+@pytest.mark.parametrize("healthy", [0, 1000])
+def test_an_exception_of_the_environment_is_named(healthy):
+    """In the replay of the trajectory, and while training."""
     found = plan("pbcs/Maze-v0", "Ex", env_kwargs=MAZE, seed=3)
     model = make("pbcs/Maze-v0", MAZE)
+    transition, calls = model.transition, []
 
     def broken(states, controls):
-        raise ZeroDivisionError("physics")
+        calls.append(len(states))
+        if len(calls) > healthy:
+            raise ZeroDivisionError("physics")
+        return transition(states, controls)
 
     model.transition = broken
     with pytest.raises(CallbackFailed, match="physics"):
