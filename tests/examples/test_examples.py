@@ -16,6 +16,7 @@ EXAMPLES = {
     "plain_ompl_car.py": ([], "OMPL's own check: True"),
     "look_at_a_critic.py": (["200"], "critic.png"),
     "stable_baselines_agent.py": ([], "solved: True"),
+    "ddpg_huber.py": ([], "solved: "),
 }
 
 
