@@ -98,3 +98,18 @@ def test_every_folder_of_the_overview_exists():
     assert all((ROOT / name).is_dir() for name in named)
     packages = {f"pbcs_ompl/{path.parent.name}" for path in (ROOT / "pbcs_ompl").glob("*/__init__.py")}
     assert packages - named == {"pbcs_ompl/planners", "pbcs_ompl/envs"}
+
+
+def test_the_picture_is_what_its_command_makes(tmp_path, monkeypatch):
+    """The command is that of `make demo`, which the caption names."""
+    from matplotlib.image import imread
+
+    assert "`chain.png` of `make demo`" in README
+    (recipe,) = re.findall(r"^\t\$\(BIN\)/pbcs (train .*)$", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(recipe)) == 0
+    (shown,) = re.findall(r"!\[.*\]\((.*)\)", README)
+    made, kept = imread(tmp_path / "runs/demo/chain.png"), imread(ROOT / shown)
+    assert made.shape == kept.shape
+    different = (abs(made - kept) > 0.1).any(axis=2).mean()
+    assert different < 1e-3, f"{different:.1%} of the pixels differ: copy runs/demo/chain.png of `make demo` to {shown}"
