@@ -1,4 +1,4 @@
-"""Plan in any environment that can be reset anywhere, with any planner."""
+"""Plan in any environment that can be reset, with any planner."""
 
 import time
 from collections.abc import Iterator

@@ -10,7 +10,7 @@ from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_comparison
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
-from pbcs_ompl.core.formatting import duration, short
+from pbcs_ompl.core.formatting import format_duration, format_number
 from pbcs_ompl.experiments.compare import compare
 from pbcs_ompl.results.command_line import command, report_words
 
@@ -68,8 +68,8 @@ def _closing_lines(summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
 
 def _cells(row: dict[str, Any]) -> str:
     share, (low, high) = f"{row['solved']}/{row['runs']}", row["wilson"]
-    transitions = "-" if row["transitions_median"] is None else short(row["transitions_median"])
-    seconds = "-" if row["seconds_median"] is None else duration(row["seconds_median"])
+    transitions = "-" if row["transitions_median"] is None else format_number(row["transitions_median"])
+    seconds = "-" if row["seconds_median"] is None else format_duration(row["seconds_median"])
     return f"{share:<10}{f'{low:.0%} to {high:.0%}':<17}{transitions:<15}{seconds}"
 
 

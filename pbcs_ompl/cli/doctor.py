@@ -121,10 +121,10 @@ def _closing_lines(result: dict[str, Any]) -> list[tuple[str, str]]:
     lines += [("agents", ", ".join(result["agents"])), ("envs", ", ".join(result["environments"]))]
     if result["environment"] is not None:
         checks = result["environment"]["checks"]
-        verdict = "can be" if result["environment"]["ok"] else "CANNOT be trusted to be"
-        lines.append(("reset", f"{result['environment']['env']} {verdict} reset anywhere"))
+        verdict = "is resettable" if result["environment"]["ok"] else "is NOT resettable"
+        lines.append(("reset", f"{result['environment']['env']} {verdict}"))
         lines += [("", f"{'ok  ' if c['ok'] else 'FAIL'} {c['name']} {c['detail']}".rstrip()) for c in checks]
         found = result["environment"]
         abilities = f"{', '.join(found['capabilities'])}; {found['adapter']}, {found['state_size']} numbers a state"
-        lines += [("can", abilities), ("feature", found["feature"]), ("goal", found["goal"])]
+        lines += [("offers", abilities), ("feature", found["feature"]), ("goal", found["goal"])]
     return lines

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pbcs_ompl.cli.terminal import print_summary
-from pbcs_ompl.core.formatting import percent, short
+from pbcs_ompl.core.formatting import format_number, format_rate
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words
@@ -39,10 +39,10 @@ def run(arguments: Namespace) -> int:
 
 def _closing_lines(arguments: Namespace, summary: dict[str, Any]) -> list[tuple[str, str]]:
     noise = f", {arguments.epsilon:.0%} random actions" if arguments.epsilon else ""
-    lines = [("success", percent(summary["success_rate"], summary["wilson"])),
+    lines = [("success", format_rate(summary["success_rate"], summary["wilson"])),
              ("rollouts", f"{summary['episodes']} from the start{noise}")]
     if summary["steps_median"] is not None:
-        lines.append(("steps", f"{short(summary['steps_median'])} to the goal, median"))
+        lines.append(("steps", f"{format_number(summary['steps_median'])} to the goal, median"))
     if arguments.video:
         lines.append(("video", arguments.video))
     if not arguments.epsilon:

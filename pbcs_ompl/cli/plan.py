@@ -9,7 +9,7 @@ from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.models import note_rules
 from pbcs_ompl.cli.pictures import draw_tree
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
-from pbcs_ompl.core.formatting import duration, short
+from pbcs_ompl.core.formatting import format_duration, format_number
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, environment_words
@@ -34,12 +34,13 @@ def run(arguments: Namespace) -> int:
 
 
 def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[tuple[str, str]]:
-    rate = short(result.transitions / max(result.seconds, 1e-9))
-    effort = f"{short(result.transitions)} transitions, {duration(result.seconds)} ({rate} transitions/s)"
-    lines = [("solved" if result.solved else "not solved", effort), ("tree", f"{short(result.nodes)} nodes")]
+    rate = format_number(result.transitions / max(result.seconds, 1e-9))
+    effort = (f"{format_number(result.transitions)} transitions, {format_duration(result.seconds)} "
+              f"({rate} transitions/s)")
+    lines = [("solved" if result.solved else "not solved", effort), ("tree", f"{format_number(result.nodes)} nodes")]
     if result.solved:
         replay = "replays exactly" if result.replay_ok else "DOES NOT REPLAY (not deterministic?)"
-        lines.append(("path", f"{short(result.path_length)} steps, {replay}"))
+        lines.append(("path", f"{format_number(result.path_length)} steps, {replay}"))
         words = environment_words(environment(arguments))
         following = command(["train", *words, "--path", str(out)])
     else:

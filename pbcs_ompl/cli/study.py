@@ -9,7 +9,7 @@ from pbcs_ompl.cli.executor import executor
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.core.formatting import in_words
+from pbcs_ompl.core.formatting import format_value
 from pbcs_ompl.experiments.records import record_file
 from pbcs_ompl.experiments.run import Shard
 from pbcs_ompl.experiments.run_study import open_study, run_shard, run_study
@@ -94,7 +94,7 @@ def _closing_lines(title: str, summary: dict[str, Any], out: Path) -> list[tuple
     lines = [(summary["id"], f"{title}: {summary['runs']} runs")]
     for claim in summary["agrees"]:
         lines.append((VERDICTS[claim["agrees"]], f"{claim['claim']}  ({claim['source']})"))
-        lines += [("", f"{name}: {in_words(value)}") for name, value in claim["numbers"].items()]
+        lines += [("", f"{name}: {format_value(value)}") for name, value in claim["numbers"].items()]
         lines += [("", claim["note"])] if claim["note"] else []
     lines += _failures(summary["failed"])
     return [*lines, ("figures", ", ".join(summary["figures"]) or "none"), ("files", list_files(out)),

@@ -11,7 +11,7 @@ from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from pbcs_ompl.core.formatting import duration, short
+from pbcs_ompl.core.formatting import format_duration, format_number
 from pbcs_ompl.core.plain import plain
 
 SECONDS_BETWEEN_LINES = 10.0
@@ -71,7 +71,7 @@ class ProgressDisplay:
             self._bar.table = _table(numbers.get("table", []))
         elif now - self._last_line > SECONDS_BETWEEN_LINES:
             self._last_line = now
-            rows = ("  " + ", ".join(f"{name} {short(value)}" for name, value in row.items())
+            rows = ("  " + ", ".join(f"{name} {format_number(value)}" for name, value in row.items())
                     for row in numbers.get("table", []))
             print(text, *rows, sep="\n", file=sys.stderr, flush=True)
 
@@ -84,13 +84,13 @@ class ProgressDisplay:
         return min(1.0, max(shares)) if shares else None
 
     def _describe(self, numbers: dict[str, Any], seconds: float, share: float | None) -> str:
-        parts = [f"{name.replace('_', ' ')} {short(value)}" for name, value in numbers.items()
+        parts = [f"{name.replace('_', ' ')} {format_number(value)}" for name, value in numbers.items()
                  if name not in ("seconds", "covered", "table")]
         if seconds > 0 and self._count in numbers:
-            parts.append(f"{short(numbers[self._count] / seconds)} {self._count}/s")
+            parts.append(f"{format_number(numbers[self._count] / seconds)} {self._count}/s")
         if share:
             bound = f"{share:.0%} of the plan covered, about" if "covered" in numbers else "at most"
-            parts.append(f"{bound} {duration(seconds * (1 - share) / share)} left")
+            parts.append(f"{bound} {format_duration(seconds * (1 - share) / share)} left")
         return ", ".join(parts)
 
 
@@ -102,7 +102,7 @@ def _table(rows: Sequence[dict[str, Any]]) -> Table | None:
     for name, value in rows[0].items():
         table.add_column(name, justify="left" if isinstance(value, str) else "right")
     for row in rows:
-        table.add_row(*map(short, row.values()))
+        table.add_row(*map(format_number, row.values()))
     return table
 
 

@@ -9,7 +9,7 @@ from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_chain
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary, warn
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.core.formatting import duration, percent, short
+from pbcs_ompl.core.formatting import format_duration, format_number, format_rate
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words, resume_words
 from pbcs_ompl.results.files import CONFIG, TRAJECTORY
@@ -76,16 +76,16 @@ def _draw(result: TrainResult, out: Path) -> None:
 
 
 def _closing_lines(result: TrainResult, out: Path) -> list[tuple[str, str]]:
-    effort = (f"{short(result.plan_transitions)} transitions of planning, "
-              f"{short(result.train_transitions)} of training, {short(result.updates)} updates, "
-              f"{duration(result.seconds)}")
+    effort = (f"{format_number(result.plan_transitions)} transitions of planning, "
+              f"{format_number(result.train_transitions)} of training, {format_number(result.updates)} updates, "
+              f"{format_duration(result.seconds)}")
     lines = [("solved" if result.solved else "not solved", effort)]
     if result.chain is not None:
         lines.append(("chain", f"{len(result.chain.skills)} skills"))
     if result.nominal is not None and result.nominal.steps_median is not None:
-        lines.append(("rollout", f"{short(result.nominal.steps_median)} steps to the goal without noise"))
+        lines.append(("rollout", f"{format_number(result.nominal.steps_median)} steps to the goal without noise"))
     if result.robust is not None:
-        rate = percent(result.robust.success_rate, result.robust.wilson)
+        rate = format_rate(result.robust.success_rate, result.robust.wilson)
         lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions"))
     lines.append(("files", list_files(out)))
     if result.complete:

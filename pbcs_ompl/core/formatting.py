@@ -4,14 +4,14 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 
-def short(value: Any) -> str:
+def format_number(value: Any) -> str:
     """Write a number for reading: thousands separated, three digits after a small point."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
     return f"{value:,.0f}" if isinstance(value, int) or abs(value) >= 100 else f"{value:.3g}"
 
 
-def duration(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """Write a duration for reading."""
     if seconds < 10:
         return f"{seconds:.2g} s"
@@ -20,32 +20,32 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s" if minutes else f"{rest} s"
 
 
-def percent(rate: float, wilson: Sequence[float]) -> str:
+def format_rate(rate: float, wilson: Sequence[float]) -> str:
     """Write a success rate with its 95 % Wilson interval."""
     return f"{rate:.0%} (95 % interval {wilson[0]:.0%} to {wilson[1]:.0%})"
 
 
-def in_words(value: Any) -> str:
+def format_value(value: Any) -> str:
     """Write what decides a claim: a rate with its Wilson interval, other numbers, lists and tables of them."""
     if isinstance(value, dict) and "wilson" in value:
         rate, (low, high) = value["rate"], value["wilson"]
         interval = "" if rate is None else f" = {rate:.1%} (95 % interval {low:.1%} to {high:.1%})"
         return f"{value['successes']}/{value['n']}{interval}"
     if isinstance(value, dict):
-        return ", ".join(f"{name} {in_words(part)}" for name, part in value.items())
+        return ", ".join(f"{name} {format_value(part)}" for name, part in value.items())
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(in_words, value))}]"
+        return f"[{', '.join(map(format_value, value))}]"
     if isinstance(value, float):
         return f"{value:,.0f}" if abs(value) >= 1e4 else f"{value:.4g}"
     return str(value)
 
 
-def span(low: float, high: float) -> str:
+def format_interval(low: float, high: float) -> str:
     """Write an interval of rates for reading."""
     return f"{low:.0%} to {high:.0%}"
 
 
-def seeds_in_words(seeds: Iterable[int]) -> str:
+def format_seeds(seeds: Iterable[int]) -> str:
     """Write seeds for reading, as 0-9, 12."""
     runs: list[list[int]] = []
     for seed in sorted(set(seeds)):

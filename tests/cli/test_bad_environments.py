@@ -1,4 +1,4 @@
-"""What cannot be reset anywhere, and rules that say nothing, end in one line with a remedy and the right status."""
+"""What is not resettable, and rules that say nothing, end in one line with a remedy and the right status."""
 
 import json
 import shlex

@@ -11,19 +11,19 @@ from rich.console import Console
 
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.terminal import ProgressDisplay, print_summary
-from pbcs_ompl.core.formatting import duration, short
+from pbcs_ompl.core.formatting import format_duration, format_number
 
 
 @pytest.mark.parametrize(("value", "text"), [(1234567, "1,234,567"), (1234.5, "1,234"), (0.12345, "0.123"),
                                               (True, "True"), ("x", "x"), (0, "0")])
 def test_short(value, text):
-    assert short(value) == text
+    assert format_number(value) == text
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(0.0123, "0.012 s"), (9.99, "10 s"), (75, "1 min 15 s"),
                                                 (3720, "1 h 2 min"), (59.7, "1 min 0 s")])
 def test_duration(seconds, text):
-    assert duration(seconds) == text
+    assert format_duration(seconds) == text
 
 
 def test_json_is_the_last_line_on_stdout_and_all_there_is(capsys):

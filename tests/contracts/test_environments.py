@@ -62,7 +62,7 @@ def test_gymnasium_finds_no_fault(env_id: str) -> None:
     assert [str(w.message) for w in caught if EXPECTED_WARNING not in str(w.message)] == []
 
 
-def test_it_can_be_reset_anywhere(env_id: str) -> None:
+def test_it_is_resettable(env_id: str) -> None:
     report = check_resettable(gymnasium.make(env_id))
     assert report.ok, str(report)
 

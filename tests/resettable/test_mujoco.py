@@ -37,7 +37,7 @@ def chain_of(model: Any, steps: int, seed: int = 0) -> tuple[np.ndarray, np.ndar
     return np.array(states), controls
 
 
-def test_it_can_be_reset_anywhere(model: Any) -> None:
+def test_it_is_resettable(model: Any) -> None:
     report = check_resettable(model)
     assert report.ok, str(report)
 

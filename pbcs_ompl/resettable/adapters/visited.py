@@ -158,7 +158,7 @@ def check_replays(env: Any) -> None:
         env.reset(seed=seed)
         walks.append(_walk(env, actions))
     if walks[0] != walks[2]:
-        raise NotResettable(f"{type(env).__name__} cannot be reset anywhere: the same actions from the same seed "
+        raise NotResettable(f"{type(env).__name__} is not resettable: the same actions from the same seed "
                               f"lead elsewhere, so its steps are random; make the randomness part of its state")
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile
-from pbcs_ompl.core.formatting import duration, percent, seeds_in_words, short, span
+from pbcs_ompl.core.formatting import format_duration, format_interval, format_number, format_rate, format_seeds
 from pbcs_ompl.experiments.compare import Comparison, read_comparison
 from pbcs_ompl.experiments.study import study_ids
 from pbcs_ompl.results.files import RUNS, read_json
@@ -88,14 +88,14 @@ def _plan(folder: Folder) -> Content:
     title, seeds = f"{config['planner']} in {_environment(config)}", str(config["seed"])
     if result is None:
         return Content(title, UNFINISHED, None, [], seeds)
-    summary = [("transitions", short(result["transitions"])), ("seconds", duration(result["seconds"])),
-               ("nodes", short(result["nodes"]))]
+    summary = [("transitions", format_number(result["transitions"])), ("seconds", format_duration(result["seconds"])),
+               ("nodes", format_number(result["nodes"]))]
     if not result["solved"]:
         return Content(title, "not solved", False, summary, seeds,
                        failures=[("not solved", "the budget ended before the goal was reached")])
     replay = "replays exactly" if result["replay_ok"] else "does not replay"
     return Content(title, f"solved, {replay}", bool(result["replay_ok"]),
-                   [("path", f"{short(result['path_length'])} steps"), *summary], seeds)
+                   [("path", f"{format_number(result['path_length'])} steps"), *summary], seeds)
 
 
 def _training(folder: Folder) -> Content:
@@ -103,11 +103,12 @@ def _training(folder: Folder) -> Content:
     title = f"{config['method']} with {config['agent']} in {_environment(config)}"
     if result is None:
         return Content(title, UNFINISHED, None, [], str(config["seed"]))
-    summary = [("skills", str(result["skills"])), ("transitions of planning", short(result["plan_transitions"])),
-               ("transitions of training", short(result["train_transitions"])),
-               ("updates", short(result["updates"])), ("time", duration(result["seconds"]))]
+    summary = [("skills", str(result["skills"])),
+               ("transitions of planning", format_number(result["plan_transitions"])),
+               ("transitions of training", format_number(result["train_transitions"])),
+               ("updates", format_number(result["updates"])), ("time", format_duration(result["seconds"]))]
     if result["wilson"] is not None:
-        summary.insert(0, ("success with 10 % random actions", percent(result["success_rate"], result["wilson"])))
+        summary.insert(0, ("success with 10 % random actions", format_rate(result["success_rate"], result["wilson"])))
     reason = result["reason"]
     return Content(title, "solved" if result["solved"] else "not solved", result["solved"], summary,
                    str(config["seed"]), failures=[] if result["solved"] else [("not solved", reason)])
@@ -118,10 +119,10 @@ def _evaluation(folder: Folder) -> Content:
     title = f"Evaluation of {config['chain']} in {_environment(config)}"
     if result is None:
         return Content(title, UNFINISHED, None, [])
-    rate = percent(result["success_rate"], result["wilson"])
-    steps = "no success" if result["steps_median"] is None else short(result["steps_median"])
+    rate = format_rate(result["success_rate"], result["wilson"])
+    steps = "no success" if result["steps_median"] is None else format_number(result["steps_median"])
     return Content(title, f"{result['success_rate']:.0%} success", result["success_rate"] > 0,
-                   [("success", rate), ("episodes", short(result["episodes"])), ("steps, median", steps),
+                   [("success", rate), ("episodes", format_number(result["episodes"])), ("steps, median", steps),
                     ("random actions", f"{result['epsilon']:.0%}")])
 
 
@@ -136,7 +137,7 @@ def _comparison(folder: Folder) -> Content:
                 for run in found.runs]  # the name of a run has both
     return Content(f"{', '.join(config['planners'])} compared", outcome, None,
                    [("runs", f"{runs:,}"), ("budget of a run", f"{config['max_transitions']:,} transitions")],
-                   seeds_in_words(config["seeds"]),
+                   format_seeds(config["seeds"]),
                    tables=[*_rows(found), *_tests(found), _table_of_runs(outlines, folder.path / RUNS)],
                    failures=_failures(found))
 
@@ -149,7 +150,8 @@ def _rows(found: Comparison) -> list[Table]:
 
 def _row(row: dict[str, Any]) -> list[Any]:
     quartiles = row["transitions_quartiles"]
-    return [row["planner"], f"{row['solved']}/{row['runs']}", span(*row["wilson"]), row["transitions_median"],
+    return [row["planner"], f"{row['solved']}/{row['runs']}", format_interval(*row["wilson"]),
+            row["transitions_median"],
             None if quartiles is None else " to ".join(f"{value:,.0f}" for value in quartiles),
             *(row[name] for name in MEDIANS)]
 
@@ -170,7 +172,7 @@ def _failures(found: Comparison) -> list[tuple[str, str]]:
             for run in runs:
                 if run["seconds"] is None:
                     seeds[environment, planner, run["reason"]].append(run["seed"])
-    return [(f"{planner} in {environment}, seeds {seeds_in_words(those)}", reason)
+    return [(f"{planner} in {environment}, seeds {format_seeds(those)}", reason)
             for (environment, planner, reason), those in seeds.items()]
 
 
@@ -186,7 +188,7 @@ def _study(folder: Folder) -> Content:
         outlines.append(_outline({"run": file.stem} | record))
     study, result = folder.config["study"], folder.result
     title = ": ".join(filter(None, [f"Study {study}", study_ids().get(study)]))
-    tables, words = [_table_of_runs(outlines, folder.path / RUNS)], seeds_in_words(seeds)
+    tables, words = [_table_of_runs(outlines, folder.path / RUNS)], format_seeds(seeds)
     if result is None:
         return Content(title, f"{UNFINISHED}; {len(files):,} runs made", None, [], words, tables=tables)
     failed = result["failed"]

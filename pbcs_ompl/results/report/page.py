@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
-from pbcs_ompl.core.formatting import in_words, short
+from pbcs_ompl.core.formatting import format_number, format_value
 from pbcs_ompl.results.files import write_atomically
 from pbcs_ompl.results.folder import find_folders
 from pbcs_ompl.results.report.section import DAMAGED, Section, damaged_section, make_section
@@ -84,10 +84,12 @@ def _head(page: Path) -> bytes:
 def _template() -> Any:
     environment = Environment(loader=PackageLoader("pbcs_ompl.results.report"), autoescape=True,
                               undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"cell": _cell, "in_words": in_words}
+    environment.filters |= {"cell": _cell, "format_value": format_value}
     return environment.get_template("report.html")
 
 
 def _cell(value: Any) -> str:
     """Write a value of a table."""
-    return {None: "–", True: "yes", False: "no"}[value] if value is None or isinstance(value, bool) else short(value)
+    if value is None or isinstance(value, bool):
+        return {None: "–", True: "yes", False: "no"}[value]
+    return format_number(value)

@@ -8,7 +8,7 @@ import pytest
 
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
-from pbcs_ompl.core.formatting import in_words, seeds_in_words
+from pbcs_ompl.core.formatting import format_seeds, format_value
 from pbcs_ompl.experiments.claims import rate
 from pbcs_ompl.results.files import write_json, write_toml
 from pbcs_ompl.results.report import write_report
@@ -165,7 +165,7 @@ def test_damage_of_one_folder_is_an_error(copy):
 @pytest.mark.parametrize(("seeds", "text"), [
     ([], ""), ([3], "3"), ([2, 0, 1, 1], "0-2"), ([5, 0, 1, 9, 10], "0-1, 5, 9-10")])
 def test_seeds_in_words(seeds, text):
-    assert seeds_in_words(seeds) == text
+    assert format_seeds(seeds) == text
 
 
 @pytest.mark.parametrize(("value", "text"), [
@@ -173,4 +173,4 @@ def test_seeds_in_words(seeds, text):
     ({"2x2": rate(1, 1), "skills": [2, 0.25]}, "2x2 1/1 = 100.0% (95 % interval 20.7% to 100.0%), skills [2, 0.25]"),
 ])
 def test_numbers_in_words(value, text):
-    assert in_words(value) == text
+    assert format_value(value) == text
