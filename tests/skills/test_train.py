@@ -242,6 +242,6 @@ def test_pbcs_solves_every_small_maze(size, record_property):
     mazes = [{"size": size, "maze_seed": seed} if size > 3 else {"size": size} for seed in range(seeds)]
     solved = sum(train("pbcs/Maze-v0", env_kwargs=maze, seed=seed).solved for seed, maze in enumerate(mazes))
     record_property("solve_rate", ["PBCS", f"{size}x{size}", solved, seeds])
-    # Seed 5 of size 4 has 94 of 100. In 5,000 executions its chain succeeds in 97.7 % [97.2, 98.0], less than the 98.5 %
-    # that it was verified at; a chain of that rate misses 95 of 100 with a probability of 3 %.
+    # Seed 5 of size 4 has 94 of 100. In 5,000 executions its chain succeeds in 97.7 % [97.2, 98.0], less than the
+    # 98.5 % that it was verified at; a chain of that rate misses 95 of 100 with a probability of 3 %.
     assert solved >= seeds - 1
