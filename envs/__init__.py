@@ -15,11 +15,12 @@ ENTRY_POINTS = {
     "pbcs/SparseHalfCheetah-v0": "pbcs_ompl.envs.sparse_half_cheetah:SparseHalfCheetahEnv",
 }
 
-EPISODE_STEPS = {"pbcs/Toy1D-v0": 50, "pbcs/Drift-v0": 50}
+EPISODE_STEPS = {"pbcs/Toy1D-v0": 50, "pbcs/Drift-v0": 50, "pbcs/SparseHalfCheetah-v0": 1000}
+"""Limits of episodes. Mazes, box, disc and ant have none, as in the thesis; their class suggests a length."""
 
 for _env_id, _entry_point in ENTRY_POINTS.items():
     if _env_id not in gymnasium.registry:
-        gymnasium.register(_env_id, entry_point=_entry_point, max_episode_steps=EPISODE_STEPS.get(_env_id, 1000))
+        gymnasium.register(_env_id, entry_point=_entry_point, max_episode_steps=EPISODE_STEPS.get(_env_id))
 
 if __name__ == "envs":  # the folder of a checkout, imported by its own name
     from pbcs_ompl.core.alias import alias_package

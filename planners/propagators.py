@@ -12,8 +12,8 @@ from pbcs_ompl.core.callbacks import check_finite
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, Mismatch, UnsupportedSpace
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import path_control, real_bounds, real_dimension, value_reader, value_writer
-from pbcs_ompl.core.tree import Tree
-from pbcs_ompl.core.types import Array, Counter, IndexArray, Transition
+from pbcs_ompl.core.tree import Tree, resized_copy
+from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray, Transition
 from pbcs_ompl.planners.compiled import CompiledStep, step_of
 
 
@@ -134,7 +134,10 @@ class ModelPropagator(BatchPropagator):
         _check_size("controls", si.getControlSpace(), len(model.action_low))
         self._read, self._write = value_reader(si.getStateSpace()), value_writer(si.getStateSpace())
         self.feature_dims = np.array(model.feature_dims or (), dtype=np.int64)
-        self.compiled: CompiledStep | None = step_of(model) if len(self.feature_dims) else None
+        self._limit = model.episode_limit
+        self._depths = np.empty(0, np.int64)
+        compilable = len(self.feature_dims) and self._limit is None
+        self.compiled: CompiledStep | None = step_of(model) if compilable else None
 
     def context(self) -> PlanningContext:
         """Describe the environment for a strategy."""
@@ -153,11 +156,15 @@ class ModelPropagator(BatchPropagator):
     def add_root(self, tree: Tree, state: Any, goal: Any) -> bool:
         """Add an OMPL start state; return whether the model calls it a success."""
         states = np.array([self._read(state)])
+        self._end_of_episode(tree, np.array([-1]))
         tree.append(states, -1, 0.0, 0.0, False, self._features(tree, states))
         return bool(self._model.goal_distance(states)[0] < self._model.goal_threshold)
 
     def expand(self, tree: Tree, nodes: IndexArray, controls: Array, goal: Any) -> int:
-        """Add what follows; transitions after the first success are neither kept nor counted."""
+        """Add what follows; transitions after the first success are neither kept nor counted.
+
+        A node is terminal where the environment ends the episode, or where its limit of steps is reached.
+        """
         before = tree.states[nodes]
         result = self._model.transition(before, controls)
         _check_shapes(result, before.shape)
@@ -166,8 +173,8 @@ class ModelPropagator(BatchPropagator):
         count = first_success + 1 if reached else len(nodes)
         after = result.states[:count]
         check_finite(before, controls, after)
-        tree.append(after, nodes[:count], controls[:count], result.rewards[:count], result.terminated[:count],
-                    self._features(tree, after))
+        ended = result.ended[:count] | self._end_of_episode(tree, nodes[:count])
+        tree.append(after, nodes[:count], controls[:count], result.rewards[:count], ended, self._features(tree, after))
         self.counter.count += count
         return len(tree) - 1 if reached else -1
 
@@ -180,6 +187,17 @@ class ModelPropagator(BatchPropagator):
         state = self._si.allocState()
         self._write(state, tree.states[node].tolist())
         return state
+
+    def _end_of_episode(self, tree: Tree, parents: IndexArray) -> BoolArray:
+        """Return which children of nodes [B] are at the limit of an episode [B], and keep their depths."""
+        if self._limit is None:
+            return np.zeros(len(parents), np.bool_)
+        first, last = len(tree), len(tree) + len(parents)
+        if last > len(self._depths):
+            self._depths = resized_copy(self._depths, min(first, len(self._depths)), 2 * last)
+        self._depths[first:last] = np.where(parents < 0, 0, self._depths[parents] + 1)
+        at_limit: BoolArray = self._depths[first:last] >= self._limit
+        return at_limit
 
     def _features(self, tree: Tree, states: Array) -> Array | None:
         return None if tree.columns.features is tree.columns.states else self._model.feature(states)
@@ -288,6 +306,8 @@ class OmplPropagator(BatchPropagator):
 
 def _check_shapes(result: Transition, shape: tuple[int, ...]) -> None:
     for name, array in result._asdict().items():
+        if array is None:
+            continue
         expected = shape if name == "states" else shape[:1]
         if array.shape != expected:
             raise CallbackFailed(f"the environment's transition returned {name} of shape {array.shape}; "

@@ -55,7 +55,7 @@ class TransitionRecorder:
 
         def recorded(state: list[float], control: list[float]) -> list[float]:
             reached = step(state, control)
-            copy(reached)
+            copy(reached or state)
             return reached
 
         return recorded

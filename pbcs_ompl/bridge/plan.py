@@ -16,12 +16,12 @@ from pbcs_ompl.bridge.problem import CallbackState, Problem, make_problem
 from pbcs_ompl.bridge.termination import Limits, checked_limits, interruptible, make_stop
 from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory
 from pbcs_ompl.bridge.tree import save_tree, tree_of
+from pbcs_ompl.bridge.verification import Verification, verify
 from pbcs_ompl.core.callbacks import callback_failed
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.interfaces import BatchPlanner, ResettableModel
 from pbcs_ompl.core.ompl_access import quiet_ompl
-from pbcs_ompl.core.registry import load_environments
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Counter, ProgressCallback
@@ -37,20 +37,22 @@ class PlanResult:
     """What one planner found, with its evidence.
 
     Attributes:
-        solved: Whether the goal was reached, exactly.
+        solved: Whether the plan, executed in a fresh environment by `reset` and `step` alone, reaches the goal.
+        found: Whether the planner believes to have reached it; where it is not `solved` then, `reason` says why.
+        reason: Why it is not solved; None when it is.
         transitions: Environment steps that were made.
         collision_checks: How often the environment was asked whether something collides: by every transition, and
             by every state that OMPL made up itself.
         seconds: Wall time of the search alone.
         nodes: Size of the tree.
-        path_length: Steps of the trajectory; None when unsolved.
-        replay_ok: Whether the trajectory, replayed in a fresh environment, gives the same states bit for
-            bit; None when unsolved. False is a failure of the planner or a sign that the environment is not
-            deterministic.
+        path_length: Steps of the trajectory; None when none was found.
+        replay_ok: Whether the trajectory gave the same states bit for bit in that environment; None when none was
+            found, or no fresh environment can be made. False is a failure of the planner, or a sign that the
+            environment is not deterministic or has a memory that is not restored.
         planner, env, seed: What was run.
         planner_settings: Every option of the planner with the value in use.
         out: The folder with the files, None when none was asked for.
-        trajectory: The path found, None when unsolved.
+        trajectory: The path found, solved or not; None when none was.
         tree: What was explored.
         coverage: How much of the feature space was seen after how many transitions; None unless asked for.
     """
@@ -69,27 +71,28 @@ class PlanResult:
     planner_settings: dict[str, Any]
     trajectory: Trajectory | None
     tree: Tree
+    found: bool = False
+    reason: str | None = None
     coverage: Coverage | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return the plain numbers and words, without settings and arrays."""
-        return {"solved": self.solved, "transitions": self.transitions, "collision_checks": self.collision_checks,
-                "seconds": self.seconds, "nodes": self.nodes, "path_length": self.path_length,
-                "replay_ok": self.replay_ok, "planner": self.planner, "env": self.env, "seed": self.seed,
-                "out": self.out}
+        return {"solved": self.solved, "found": self.found, "reason": self.reason, "transitions": self.transitions,
+                "collision_checks": self.collision_checks, "seconds": self.seconds, "nodes": self.nodes,
+                "path_length": self.path_length, "replay_ok": self.replay_ok, "planner": self.planner,
+                "env": self.env, "seed": self.seed, "out": self.out}
 
 
 def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "Ex", *,
          env_kwargs: dict[str, Any] | None = None, planner_kwargs: dict[str, Any] | None = None,
          goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
-         seed: int = 0, max_transitions: int = 1_000_000, max_seconds: float | None = None,
-         out: str | Path | None = None, coverage: bool = False,
-         on_progress: ProgressCallback | None = None) -> PlanResult:
+         reset_options: dict[str, Any] | None = None, max_episode_steps: int | None = None, seed: int = 0,
+         max_transitions: int = 1_000_000, max_seconds: float | None = None, out: str | Path | None = None,
+         coverage: bool = False, on_progress: ProgressCallback | None = None) -> PlanResult:
     """Search a trajectory from the environment's start to its goal.
 
-    Only an exact solution counts as solved, and the trajectory is replayed in a fresh environment to see
-    whether it is true. An unreachable goal is no error: the budget ends, `solved` is False, and the tree is
-    there to be looked at.
+    A plan counts as solved once it has been executed in a fresh environment and reached the goal there. An unreachable
+    goal is no error: the budget ends, `solved` is False, and the tree is there to be looked at.
 
     Args:
         env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model.
@@ -97,7 +100,7 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
             class (see `PlannerSpec`).
         env_kwargs: Options of the environment, when `env` is an id.
         planner_kwargs: Options of the planner.
-        goal, feature, start_seed: See `pbcs_ompl.make`.
+        goal, feature, start_seed, reset_options, max_episode_steps: See `pbcs_ompl.make`.
         seed: Equal seeds give equal paths.
         max_transitions: The most environment steps.
         max_seconds: The most wall time of the search; None for any.
@@ -112,7 +115,8 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
         RunFolderError: `out` exists, is in use, or cannot be written.
     """
     limits = checked_limits(max_transitions, max_seconds)
-    model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
+    model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options,
+                 max_episode_steps=max_episode_steps)
     spec = PlannerSpec(planner, planner_kwargs or {})
     with _new_folder(out) as folder:
         recorder = TransitionRecorder(model) if coverage else None
@@ -120,17 +124,21 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
                                         recorder=recorder) as problem:
             found = _search(problem, spec, seed, limits, on_progress)
         trajectory, transitions = found.trajectory, problem.callbacks.counter.count
+        verdict = NOTHING_FOUND if trajectory is None else verify(trajectory, model)
         result = PlanResult(
-            solved=trajectory is not None, transitions=transitions,
+            solved=verdict.solved, found=trajectory is not None, reason=verdict.reason, transitions=transitions,
             collision_checks=transitions + problem.callbacks.validity_checks, seconds=found.seconds,
             nodes=len(found.tree), path_length=None if trajectory is None else trajectory.length,
-            replay_ok=None if trajectory is None else trajectory.replays_exactly(_fresh(model)),
+            replay_ok=verdict.replays,
             planner=spec.name, env=model.spec.id, seed=seed, out=None if out is None else str(out),
             planner_settings=found.settings, trajectory=trajectory, tree=found.tree,
             coverage=None if recorder is None else recorder.coverage(found.tree, transitions, found.seconds))
         if folder is not None:
             _write(folder, result, model, limits)
     return result
+
+
+NOTHING_FOUND = Verification(False, None, "the budget ended before the goal was reached")
 
 
 class _Found(NamedTuple):
@@ -183,15 +191,9 @@ def _solution(problem: Problem, spec: PlannerSpec, seed: int) -> Trajectory | No
     if not setup.haveExactSolutionPath():
         return None
     trajectory = to_trajectory(setup.getSolutionPath(), problem.space_information, model, planner=spec.name,
-                               seed=seed)
+                               seed=seed, reset_seed=model.spec.reset_seed(seed))
     reached = model.goal_distance(trajectory.states[-1:])[0] < model.goal_threshold
     return trajectory if reached else None
-
-
-def _fresh(model: ResettableModel) -> ResettableModel:
-    """Return a new environment of the same kind; the same one where no other can be built."""
-    load_environments()
-    return make(model.spec) if model.spec.id in gymnasium.registry else model
 
 
 @contextmanager

@@ -5,7 +5,7 @@ would never be freed. No exception leaves them: OMPL's C++ cannot pass it on, so
 """
 
 from collections.abc import Callable
-from math import inf, isnan
+from math import inf, isnan, nan
 from typing import Any, Self
 
 import numpy as np
@@ -33,7 +33,8 @@ class CallbackState:
         validity_checks: How many states OMPL asked about that the environment had not just produced.
         error: The first exception of a callback.
         refused: A propagation was asked for when nothing was left of the budget.
-        reached: The state [D] that the environment produced last, which is therefore valid.
+        reached: The state [D] that the environment produced last, which is therefore valid; None where it ended an
+            episode.
     """
 
     __slots__ = ("counter", "error", "reached", "recorder", "refused", "validity_checks")
@@ -76,7 +77,8 @@ def make_propagator(model: ResettableModel, callbacks: CallbackState, read: Read
     """Return the callback propagate(state, control, duration, result) that makes one step of the environment.
 
     OMPL calls it once for every step of a control's duration, with `result` being `state` from the second step on:
-    everything is read before anything is written. Every step is counted. When a step raises or is not finite, or the
+    everything is read before anything is written. Every step is counted. Where the environment ends the episode without
+    success the result is NaN, which is not valid. When a step raises or is not finite, or the
     budget is used up, the result is a copy of the state and `callbacks` has the reason.
 
     Args:
@@ -98,6 +100,10 @@ def make_propagator(model: ResettableModel, callbacks: CallbackState, read: Read
             counter.count += 1
             controls = read_control(control)
             reached = step(values, controls)
+            if reached == []:  # the episode is over: nobody goes on from there
+                callbacks.reached = None
+                write(result, [nan] * len(values))
+                return
             total = sum(reached)
             if total - total != 0.0:  # NaN or infinite; the exact check is too slow for every step
                 check_finite(np.array([values]), np.array([controls]), np.array([reached]))

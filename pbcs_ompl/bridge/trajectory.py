@@ -13,10 +13,11 @@ from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import path_control, value_reader
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.types import Array
+from pbcs_ompl.resettable.actions import ActionMap, Actions
 from pbcs_ompl.results.files import read_arrays, write_arrays
 from pbcs_ompl.results.provenance import environment_versions
 
-FORMAT = 2
+FORMAT = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,24 +27,33 @@ class Trajectory:
     Attributes:
         environment: What makes the model that it was found in.
         states: States [T+1, D], the first is the start.
-        actions: Actions [T, A], one for each step.
+        actions: Actions as they are executed [T, ...], members of the action space in its type, one for each step.
         rewards: Rewards [T].
         planner, seed: Where the trajectory comes from.
+        reset_seed: The seed of the reset that leads to the first state; None where it is not the state of a reset, and
+            the trajectory cannot be executed in a fresh environment.
         versions: Versions of the packages the steps depend on.
     """
 
     environment: EnvSpec
     states: Array
-    actions: Array
+    actions: Actions
     rewards: Array
     planner: str = ""
     seed: int = 0
+    reset_seed: int | None = None
     versions: dict[str, str] = field(default_factory=environment_versions)
 
     @property
     def length(self) -> int:
         """The number of steps T."""
         return len(self.actions)
+
+    @property
+    def controls(self) -> Array:
+        """The actions as controls [T, A] of the model and of OMPL."""
+        size = int(np.prod(self.actions.shape[1:]))
+        return np.array(self.actions, dtype=np.float64).reshape(self.length, size)
 
     def save(self, path: str | Path) -> None:
         """Write one npz, atomically and without pickle; the words lie in it as a JSON string.
@@ -52,7 +62,7 @@ class Trajectory:
             RunFolderError: the file cannot be written.
         """
         words = {"format": FORMAT, "environment": self.environment.to_dict(),
-                 "planner": self.planner, "seed": self.seed, "versions": self.versions}
+                 "planner": self.planner, "seed": self.seed, "reset_seed": self.reset_seed, "versions": self.versions}
         write_arrays(Path(path), metadata=np.array(json.dumps(words, default=plain)), states=self.states,
                      actions=self.actions, rewards=self.rewards)
 
@@ -82,9 +92,9 @@ class Trajectory:
     def _checked(cls, path: Path, words: dict[str, Any], arrays: dict[str, np.ndarray]) -> "Trajectory":
         states, actions, rewards = arrays["states"], arrays["actions"], arrays["rewards"]
         steps = len(rewards) if rewards.ndim else -1
-        if states.ndim != 2 or actions.ndim != 2 or len(states) != steps + 1 or len(actions) != steps:
+        if states.ndim != 2 or actions.ndim not in (1, 2) or len(states) != steps + 1 or len(actions) != steps:
             raise DamagedFile(f"{path} is damaged: states {states.shape}, actions {actions.shape}, rewards "
-                              f"{rewards.shape}; expected [T+1, D], [T, A], [T]")
+                              f"{rewards.shape}; expected [T+1, D], [T, ...], [T]")
         try:
             environment = EnvSpec.from_dict(words.pop("environment"))
             return cls(environment, states=states, actions=actions, rewards=rewards, **words)
@@ -92,16 +102,40 @@ class Trajectory:
             raise DamagedFile(f"{path} is not a trajectory: {error}") from error
 
     def replay(self, model: ResettableModel) -> Array:
-        """Return the states [T+1, D] that the actions lead to from the first state."""
-        states = np.empty_like(self.states)
-        states[0] = self.states[0]
-        for step, action in enumerate(self.actions):
-            states[step + 1] = model.transition(states[step][None], action[None]).states[0]
-        return states
+        """Return the states [T+1, D] that the actions lead to.
+
+        From a reset, where there is one: step by step in the model's environment, without restoring a state. Else from
+        the first state, by transitions.
+        """
+        if self.reset_seed is None or model.env is None:
+            return self._replay_from_first(model)
+        states = [model.initial_state(self.reset_seed)]
+        for action in self.actions:
+            model.env.step(np.array(action)[()])
+            states.append(np.array(model.env.get_env_state(), dtype=np.float64))
+        return np.array(states)
+
+    def _replay_from_first(self, model: ResettableModel) -> Array:
+        states = [self.states[0]]
+        for control in self.controls:
+            states.append(model.transition(states[-1][None], control[None]).states[0])
+        return np.array(states)
+
+    def first_difference(self, model: ResettableModel) -> int | None:
+        """Return the first step whose state a replay does not give bit for bit, 0 for the start; None if all are equal.
+
+        Args:
+            model: An environment of the same kind, which is moved.
+        """
+        replayed = self.replay(model)
+        if replayed.shape != self.states.shape:
+            return 0
+        unequal = [one.tobytes() != other.tobytes() for one, other in zip(replayed, self.states, strict=True)]
+        return unequal.index(True) if any(unequal) else None
 
     def replays_exactly(self, model: ResettableModel) -> bool:
-        """Whether `replay` gives the same states, bit for bit."""
-        return self.replay(model).tobytes() == self.states.tobytes()
+        """Return whether a replay gives the same states, bit for bit."""
+        return self.first_difference(model) is None
 
     def check_belongs_to(self, model: ResettableModel) -> None:
         """Refuse a model that the trajectory was not made in.
@@ -119,7 +153,7 @@ class Trajectory:
 
 
 def to_trajectory(path: Any, space_information: Any, model: ResettableModel, *, planner: str = "",
-                  seed: int = 0) -> Trajectory:
+                  seed: int = 0, reset_seed: int | None = None) -> Trajectory:
     """Return the trajectory of a PathControl.
 
     A control that lasts k steps becomes k actions, and the states in between come from stepping the model.
@@ -129,7 +163,7 @@ def to_trajectory(path: Any, space_information: Any, model: ResettableModel, *, 
         path: An `ompl.control.PathControl` of the model's problem.
         space_information: That problem's `ompl.control.SpaceInformation`.
         model: The environment.
-        planner, seed: Kept in the trajectory.
+        planner, seed, reset_seed: Kept in the trajectory.
 
     Raises:
         Mismatch: a control lasts something else than a positive number of whole steps.
@@ -137,24 +171,24 @@ def to_trajectory(path: Any, space_information: Any, model: ResettableModel, *, 
     read = value_reader(space_information.getStateSpace())
     read_control = value_reader(space_information.getControlSpace())
     step_size = space_information.getPropagationStepSize()
-    states, actions = [np.array(read(path.getState(0)))], []
+    states, controls = [np.array(read(path.getState(0)))], []
     for index in range(path.getControlCount()):
         steps = _whole_steps(path.getControlDuration(index), step_size)
-        action = np.array(read_control(path.getControl(index)))
+        control = np.array(read_control(path.getControl(index)))
         for _ in range(steps - 1):
-            states.append(model.transition(states[-1][None], action[None]).states[0])
+            states.append(model.transition(states[-1][None], control[None]).states[0])
         states.append(np.array(read(path.getState(index + 1))))
-        actions += [action] * steps
-    all_states = np.array(states)
-    all_actions = np.array(actions).reshape(len(actions), len(model.action_low))
-    rewards = model.transition(all_states[:-1], all_actions).rewards if actions else np.empty(0)
-    return Trajectory(environment=model.spec, states=all_states, actions=all_actions,
-                      rewards=np.asarray(rewards, dtype=np.float64), planner=planner, seed=seed)
+        controls += [control] * steps
+    all_states, all_controls = np.array(states), np.array(controls).reshape(len(controls), len(model.action_low))
+    rewards = model.transition(all_states[:-1], all_controls).rewards if controls else np.empty(0)
+    actions = all_controls if model.env is None else ActionMap.of(model.env.action_space).to_actions(all_controls)
+    return Trajectory(environment=model.spec, states=all_states, actions=actions,
+                      rewards=np.asarray(rewards, dtype=np.float64), planner=planner, seed=seed, reset_seed=reset_seed)
 
 
 def to_path(trajectory: Trajectory, space_information: Any) -> Any:
     """Return the PathControl of a trajectory, with one control for each step."""
-    return path_control(space_information, trajectory.states, trajectory.actions)
+    return path_control(space_information, trajectory.states, trajectory.controls)
 
 
 def _whole_steps(duration: float, step_size: float) -> int:

@@ -18,9 +18,11 @@ class EnvSpec:
         goal: What a success is, as a rule; None for what the environment reports (see `resettable.rules`).
         feature: What planners explore, as a rule; None for the adapter's choice.
         start_seed: Every episode starts as `reset(seed=start_seed)` does; None where each has a seed of its own.
+        reset_options: What every reset gets as `options`; None for nothing.
+        max_episode_steps: Steps after which an episode is cut off; None for the limit that the id is registered with.
 
     Raises:
-        InvalidOption: `start_seed` is not an integer >= 0.
+        InvalidOption: `start_seed` is no integer >= 0, `max_episode_steps` none >= 1, or `reset_options` no dictionary.
     """
 
     id: str
@@ -28,11 +30,18 @@ class EnvSpec:
     goal: str | None = None
     feature: str | None = None
     start_seed: int | None = None
+    reset_options: dict[str, Any] | None = None
+    max_episode_steps: int | None = None
 
     def __post_init__(self) -> None:
-        seed = self.start_seed
-        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int) or seed < 0):
-            raise InvalidOption(f"start_seed is {seed!r}; expected an integer >= 0")
+        _check_integer("start_seed", self.start_seed, 0)
+        _check_integer("max_episode_steps", self.max_episode_steps, 1)
+        if not isinstance(self.reset_options, dict | None):
+            raise InvalidOption(f"reset_options is {self.reset_options!r}; expected a dictionary")
+
+    def reset_seed(self, seed: int | None) -> int | None:
+        """Return the seed of the reset in an episode that was given `seed`."""
+        return seed if self.start_seed is None else self.start_seed
 
     @property
     def label(self) -> str:
@@ -43,7 +52,9 @@ class EnvSpec:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, as files hold them; rules that are None are left out."""
-        rules = {"goal": self.goal, "feature": self.feature, "start_seed": self.start_seed}
+        rules = {"goal": self.goal, "feature": self.feature, "start_seed": self.start_seed,
+                 "reset_options": json.loads(json.dumps(self.reset_options, default=plain)),
+                 "max_episode_steps": self.max_episode_steps}
         kwargs = json.loads(json.dumps(self.kwargs, default=plain))
         return {"id": self.id, "kwargs": kwargs, **{name: rule for name, rule in rules.items() if rule is not None}}
 
@@ -65,6 +76,11 @@ class EnvSpec:
 
     def __str__(self) -> str:
         return self.label
+
+
+def _check_integer(name: str, value: Any, least: int) -> None:
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
+        raise InvalidOption(f"{name} is {value!r}; expected an integer >= {least}")
 
 
 def _compact(value: Any) -> str:

@@ -47,6 +47,10 @@ class NotResettable(PbcsError):
     """An environment that offers no way to restore a state."""
 
 
+class NotVerified(PbcsError):
+    """What a planner or a trainer believes cannot be tried in a fresh environment, so nothing is called solved."""
+
+
 class PlannerUnavailable(PbcsError):
     """A planner that the installed OMPL cannot build from Python."""
 

@@ -3,8 +3,10 @@
 States are complete: everything that is needed to restart the simulator.
 """
 
+from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
+import gymnasium
 import numpy as np
 
 from pbcs_ompl.core.env_spec import EnvSpec
@@ -29,7 +31,9 @@ class ResettableModel(Protocol):
         feature_dims: The state dimensions that are the feature, when it is a selection of them, else None.
         bin_size: Suggested edge length of exploration bins along each feature dimension [F].
         goal_threshold: A state is a success if and only if `goal_distance < goal_threshold`.
-        max_episode_steps: Suggested length of an episode.
+        max_episode_steps: Length of an episode: the limit, where there is one, else a suggestion.
+        episode_limit: Steps after which the environment cuts an episode off; None where it has no limit.
+        make_env: Makes a fresh environment, to verify in; None where that is not possible.
         parallel_batch: How many states `transition` has to be given together to keep all cores busy; 1 where it does
             not matter. It does not depend on the number of cores, so results do not either.
         walls: Rectangles [W, 4] (x0, y0, x1, y1) in the first two feature dimensions, for pictures; may be empty.
@@ -50,6 +54,8 @@ class ResettableModel(Protocol):
     observation_size: int
     goal_threshold: float
     max_episode_steps: int
+    episode_limit: int | None
+    make_env: Callable[[], gymnasium.Env[Any, Any]] | None
     parallel_batch: int
     walls: Array
     goal_circle: tuple[float, float, float] | None
@@ -63,7 +69,10 @@ class ResettableModel(Protocol):
         ...
 
     def step_one(self, state: list[float], control: list[float]) -> list[float]:
-        """Advance one state, given and returned as a list of D floats: the fast path of a single propagation."""
+        """Advance one state, given and returned as a list of D floats: the fast path of a single propagation.
+
+        Empty where the episode ends there and is no success: nobody goes on from there.
+        """
         ...
 
     def observe(self, states: Array) -> Array:

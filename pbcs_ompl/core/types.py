@@ -26,9 +26,16 @@ class Transition(NamedTuple):
     rewards: Array
     """Rewards [B]."""
     terminated: BoolArray
-    """Whether the episode ends in the next state [B]. Planners never expand such a state."""
+    """Whether the environment terminates in the next state [B]: what follows has no value."""
     success: BoolArray
     """Whether the next state reaches the environment's goal [B]."""
+    truncated: BoolArray | None = None
+    """Whether the environment itself cuts the episode off in the next state [B]; None where it never does."""
+
+    @property
+    def ended(self) -> BoolArray:
+        """Whether the episode is over in the next state [B], for whatever reason. Nobody goes on from there."""
+        return self.terminated if self.truncated is None else self.terminated | self.truncated
 
 
 class Counter:

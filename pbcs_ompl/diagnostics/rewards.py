@@ -53,7 +53,7 @@ def returns_of(model: ResettableModel, act: Act, states: Array, controls: Array,
     for step in range(horizon):
         outcome = model.transition(here, actions)
         returns += np.where(running, discount**step * outcome.rewards, 0.0)
-        running &= ~outcome.terminated
+        running &= ~outcome.ended
         if not running.any():
             break
         here = outcome.states

@@ -227,7 +227,7 @@ def solved(model: ResettableModel, agent: StackedAgent, starts: Array, max_steps
         outcome = model.transition(states, actions)
         states = outcome.states
         success |= outcome.success & running
-        running &= ~(outcome.success | outcome.terminated)
+        running &= ~(outcome.success | outcome.ended)
         if not running.any():
             break
     return success

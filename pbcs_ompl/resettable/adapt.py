@@ -9,6 +9,7 @@ import gymnasium
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, NotResettable
 from pbcs_ompl.core.interfaces import GetSetEnv, ResettableModel, VectorisedEnv
+from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.resettable.adapters.classic import AttributeEnv, VectorEnv, has_state_attribute
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel
 from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, MujocoModel, check_observes, is_mujoco_env
@@ -17,8 +18,9 @@ from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
 from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, check_replays, copies_are_faithful
 from pbcs_ompl.resettable.attributes import EnvAttributes, misspelt
+from pbcs_ompl.resettable.fresh import episode_limit, fresh_maker
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
-from pbcs_ompl.resettable.supported import check_actions, check_flattenable, check_observations, unwrap
+from pbcs_ompl.resettable.supported import check_flattenable, check_observations, unwrap
 
 HOW_TO = (
     "implement `get_env_state() -> array [D]` and `set_env_state(array)` beside `step` (simple), or the "
@@ -45,22 +47,40 @@ def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | Featur
         InvalidOption: a rule does not parse, or does not fit the environment.
     """
     if not isinstance(env, gymnasium.Env):
+        return adapt_without_copy(env, goal=goal, feature=feature)
+    make_env = fresh_maker(env)  # before anything runs in it
+    model = adapt_without_copy(env, goal=goal, feature=feature)
+    model.make_env = make_env
+    return model
+
+
+def adapt_without_copy(env: Any, *, goal: str | GoalRule | None = None,
+                       feature: str | FeatureRule | None = None) -> ResettableModel:
+    """Return `env` as a `ResettableModel` that has no `make_env`; see `adapt`."""
+    if not isinstance(env, gymnasium.Env):
         if goal is not None or feature is not None:
             raise InvalidOption("a goal or feature can be given to a gymnasium.Env only, not to its adapted model")
         return _as_model(env)
-    inner = unwrap(env)
+    limit = episode_limit(env)
+    model = _choose(unwrap(env), goal, feature)
+    if limit is not None:
+        model.episode_limit = model.max_episode_steps = limit
+    return model
+
+
+def _choose(inner: Any, goal: Any, feature: Any) -> ResettableModel:
     if isinstance(inner, RestorableEnv):
         return _model_of(inner)
     if isinstance(inner, SuccessFlagEnv):
         return _as_model(GetSetStateModel(inner))
-    check_actions(inner)
+    ActionMap.of(inner.action_space)  # before anything runs
     _warn_of_misspelt(inner)
     ruled = goal is not None or feature is not None
     if isinstance(inner, VectorisedEnv) and not ruled:
-        check_observations(inner)
+        check_observations(cast(gymnasium.Env[Any, Any], inner))
         return _as_model(VectorisedModel(inner))
     if isinstance(inner, GetSetEnv) and not (is_mujoco_env(inner) and not _is_vector(inner)):
-        check_observations(inner)
+        check_observations(cast(gymnasium.Env[Any, Any], inner))
         return _model_of(VectorEnv(inner, goal, feature)) if ruled else _get_set(inner)
     check_flattenable(inner)
     return _model_of(_restorable(inner, goal, feature))

@@ -54,7 +54,8 @@ class EnvAttributes:
     advance_towards: Callable[[Array, Array], Array] | None = _optional(
         "no steering", "controls [B, A] from states [B, D] towards features [B, F]")
     step_one: Callable[[list[float], list[float]], list[float]] | None = _optional(
-        "`transition` of one", "the next state of one state, as lists of floats; of vectorised environments")
+        "`transition` of one", "the next state of one state, as lists of floats, empty where an episode ends without "
+        "success; of vectorised environments")
     compiled_step: Callable[[], Any] | None = _optional(
         "none", "the step for compiled planners, of vectorised environments; see docs/planners.md")
     walls: Array | None = _optional("none", "rectangles [W, 4] (x0, y0, x1, y1), for pictures")

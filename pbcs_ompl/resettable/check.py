@@ -12,6 +12,7 @@ from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, PbcsError, UnknownName
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
+from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.resettable.adapt import adapt
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
@@ -134,6 +135,7 @@ class _Trial:
     def __init__(self, model: Any, seed: int):
         self.model = model
         self.env: Any = model.env
+        self.actions = ActionMap.of(model.env.action_space)
         rng = np.random.default_rng(seed)
         self.start = model.initial_state(seed)
         self.controls = rng.uniform(model.action_low, model.action_high, (STEPS, len(model.action_low)))
@@ -146,10 +148,10 @@ class _Trial:
         """Restore `state` in `env` and step until the controls or the episode end."""
         env.set_env_state(state.copy())
         rows = []
-        for control in self.controls.astype(env.action_space.dtype):
-            observation, reward, terminated, _, _ = env.step(control)
+        for action in self.actions.to_actions(self.controls):
+            observation, reward, terminated, truncated, _ = env.step(action)
             rows.append((np.array(env.get_env_state()), np.array(observation), reward, terminated))
-            if terminated:
+            if terminated or truncated:
                 break
         return _Roll(*(np.array(column) for column in zip(*rows, strict=True)))
 
@@ -158,8 +160,9 @@ class _Trial:
 
     def disturbed(self) -> str:
         self.env.reset(seed=12345)
-        for control in self.controls[::-1].astype(self.env.action_space.dtype):
-            if self.env.step(control)[2]:
+        for action in self.actions.to_actions(self.controls[::-1]):
+            _, _, terminated, truncated, _ = self.env.step(action)
+            if terminated or truncated:
                 break
         return self.first.difference(self.roll(self.env, self.start))
 
@@ -197,7 +200,7 @@ class _Trial:
         return states, self.controls[: len(states)]
 
     def transition_is_step(self) -> str:
-        after, rewards, terminated, success = self.model.transition(*self._batch())
+        after, rewards, terminated, success, _ = self.model.transition(*self._batch())
         found = _Roll(after, self.first.observations, rewards, terminated).difference(self.first)
         if found:
             return found
@@ -209,15 +212,19 @@ class _Trial:
         batch = self.model.transition(states, controls)
         parts = [self.model.transition(states[k : k + 1], controls[k : k + 1]) for k in range(len(states))]
         for name, whole, pieces in zip(batch._fields, batch, zip(*parts, strict=True), strict=True):
-            if not np.array_equal(whole, np.concatenate(pieces)):
+            if whole is not None and not np.array_equal(whole, np.concatenate(pieces)):
                 return f"{name} differ"
         return ""
 
     def step_one_is_transition(self) -> str:
         states, controls = self._batch()
-        after = self.model.transition(states, controls).states
-        single = [self.model.step_one(s, c) for s, c in zip(states.tolist(), controls.tolist(), strict=True)]
-        return "" if np.array_equal(after, np.array(single)) else "states differ"
+        outcome = self.model.transition(states, controls)
+        for row in range(len(states)):
+            after = self.model.step_one(states[row].tolist(), controls[row].tolist())
+            lost = bool(outcome.ended[row] and not outcome.success[row])
+            if after != ([] if lost else outcome.states[row].tolist()):
+                return f"step {row} differs"
+        return ""
 
     def arbitrary(self) -> str:
         for state in self.candidates[self.model.is_valid(self.candidates)]:

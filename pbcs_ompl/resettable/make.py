@@ -4,6 +4,7 @@ import inspect
 import os
 from contextlib import redirect_stderr
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from io import StringIO
 from typing import Any
@@ -16,7 +17,8 @@ from pbcs_ompl.core.errors import InvalidOption, MissingDependency, UnknownName,
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.registry import load_environments
 from pbcs_ompl.core.rendering import prefer_headless_rendering, renderer_is_missing
-from pbcs_ompl.resettable.adapt import adapt
+from pbcs_ompl.resettable.adapt import adapt, adapt_without_copy
+from pbcs_ompl.resettable.fresh import limited
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 
 KNOWN_TO_FAIL = ("Fetch", "Hand", "FrankaKitchen", "MaMuJoCo")
@@ -26,6 +28,7 @@ ROBOTICS = ("PointMaze", "AntMaze", "Adroit", *KNOWN_TO_FAIL)
 
 def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[str, Any] | None = None, *,
          goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
+         reset_options: dict[str, Any] | None = None, max_episode_steps: int | None = None,
          **kwargs: Any) -> ResettableModel:
     """Return the resettable model of an environment, however it is given.
 
@@ -36,6 +39,8 @@ def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[
         env_kwargs, kwargs: Options of the environment, when `env` is an id.
         goal, feature: Rules in place of the environment's success and the adapter's feature (see `rules`).
         start_seed: Every episode starts as `reset(seed=start_seed)` does.
+        reset_options: What every reset gets as `options`.
+        max_episode_steps: The length of an episode, in place of the one that the id is registered with.
 
     Raises:
         UnknownName: no such id.
@@ -45,30 +50,45 @@ def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[
         NotResettable, UnsupportedSpace: see `adapt`.
     """
     options = {**(env_kwargs or {}), **kwargs}
+    rules = {"start_seed": start_seed, "reset_options": reset_options, "max_episode_steps": max_episode_steps}
+    given = {name: value for name, value in rules.items() if value is not None}
     if isinstance(env, str):
-        return _make(EnvSpec(env, options, start_seed=start_seed), goal, feature)
+        return _make(EnvSpec(env, options, **given), goal, feature)  # type: ignore[arg-type]
     if options:
         raise InvalidOption("options of the environment go with its id; this one is built already: leave out "
                             f"{', '.join(options)}")
     if isinstance(env, EnvSpec):
-        return _make(env if start_seed is None else replace(env, start_seed=start_seed),
-                     env.goal if goal is None else goal, env.feature if feature is None else feature)
-    return _with_start(adapt(env, goal=goal, feature=feature), start_seed)
+        return _make(replace(env, **given), env.goal if goal is None else goal,  # type: ignore[arg-type]
+                     env.feature if feature is None else feature)
+    return _with_rules(adapt(env, goal=goal, feature=feature), given)
 
 
 def _make(spec: EnvSpec, goal: str | GoalRule | None, feature: str | FeatureRule | None) -> ResettableModel:
     load_environments()
     prefer_headless_rendering()
-    model = adapt(_gymnasium_make(spec), goal=goal, feature=feature)
-    model.spec = replace(model.spec, id=spec.id, start_seed=spec.start_seed)  # the id with its module, if it names one
+    model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature)
+    model.spec = replace(model.spec, id=spec.id, start_seed=spec.start_seed, reset_options=spec.reset_options,
+                         max_episode_steps=spec.max_episode_steps)  # the id with its module, if it names one
+    model.make_env = partial(fresh_env, spec)
     return model
 
 
-def _gymnasium_make(spec: EnvSpec) -> gymnasium.Env:
+def fresh_env(spec: EnvSpec) -> gymnasium.Env[Any, Any]:
+    """Return a new environment of a task, with its wrappers.
+
+    Raises:
+        UnknownName, InvalidOption, MissingDependency: see `make`.
+    """
+    load_environments()
+    prefer_headless_rendering()
+    return _gymnasium_make(spec, disable_env_checker=True)
+
+
+def _gymnasium_make(spec: EnvSpec, **options: Any) -> gymnasium.Env[Any, Any]:
     registered = _find(spec.id)
     try:
         _check_options(registered, spec.kwargs)
-        return gymnasium.make(spec.id, **spec.kwargs)
+        return gymnasium.make(spec.id, max_episode_steps=spec.max_episode_steps, **options, **spec.kwargs)
     except (gymnasium.error.DependencyNotInstalled, ModuleNotFoundError) as error:
         extra = "robotics" if spec.id.startswith(ROBOTICS) else "mujoco"
         remedy = f" (pip install 'pbcs-ompl[{extra}]')" if "mujoco" in str(error).lower() else ""
@@ -87,9 +107,13 @@ def _gymnasium_make(spec: EnvSpec) -> gymnasium.Env:
         raise InvalidOption(f"{spec.id} refuses its options {spec.kwargs}: {error}") from error
 
 
-def _with_start(model: ResettableModel, start_seed: int | None) -> ResettableModel:
-    if start_seed is not None:
-        model.spec = replace(model.spec, start_seed=start_seed)
+def _with_rules(model: ResettableModel, rules: dict[str, Any]) -> ResettableModel:
+    """Return a model of an environment that was built already, with a start seed, reset options or a limit."""
+    model.spec = replace(model.spec, **rules)
+    steps, make_env = model.spec.max_episode_steps, model.make_env
+    if steps is not None and "max_episode_steps" in rules:
+        model.episode_limit = model.max_episode_steps = steps
+        model.make_env = None if make_env is None else lambda: limited(make_env(), steps)
     return model
 
 

@@ -2,14 +2,14 @@
 
 from typing import Any, cast
 
-import gymnasium
 import numpy as np
 
-from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, NotResettable
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, Counter
+from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.resettable.attributes import EnvAttributes
+from pbcs_ompl.resettable.fresh import EnvMaker, spec_of
 from pbcs_ompl.resettable.sampling import check_radius, draw_valid, roll_near, uniform_in_ball
 
 DEFAULT_EPISODE_STEPS = 1000
@@ -19,8 +19,7 @@ class Model:
     """The half of a `ResettableModel` that does not depend on how states are restored.
 
     Args:
-        env: The environment without wrappers. One that was not made by `gymnasium.make` has no id; its
-            class's name stands in, from which it cannot be made again.
+        env: The environment without wrappers.
         offers: Its optional attributes.
         state_low, state_high: Finite bounds of the state [D].
     """
@@ -28,11 +27,12 @@ class Model:
     def __init__(self, env: Any, offers: EnvAttributes, state_low: Array, state_high: Array):
         self.env = env
         self._offers = offers
-        spec = env.spec
-        self.spec = _spec_of(env)
+        self.spec = spec_of(env)
+        self.make_env: EnvMaker | None = None
+        self.episode_limit: int | None = None
         self.state_low, self.state_high = _bounds(env, state_low, state_high)
-        self.action_low = env.action_space.low.astype(np.float64)
-        self.action_high = env.action_space.high.astype(np.float64)
+        self.actions = ActionMap.of(env.action_space)
+        self.action_low, self.action_high = self.actions.low, self.actions.high
         size = len(self.state_low)
         self._dims = list(range(size)) if offers.feature_dims is None else [int(dim) for dim in offers.feature_dims]
         self.feature_dims: tuple[int, ...] | None = tuple(self._dims)
@@ -42,16 +42,14 @@ class Model:
         extent = self.feature_high - self.feature_low
         self.bin_size: Array = np.asarray(extent / 20.0 if offers.bin_size is None else offers.bin_size, np.float64)
         self.observation_size = int(env.observation_space.shape[0])
-        limit = (None if spec is None else spec.max_episode_steps) or DEFAULT_EPISODE_STEPS
-        self.max_episode_steps = int(offers.max_episode_steps or limit)
+        self.max_episode_steps = int(offers.max_episode_steps or DEFAULT_EPISODE_STEPS)
         self.parallel_batch = int(offers.parallel_batch or 1)
         self.walls: Array = np.asarray(np.empty((0, 4)) if offers.walls is None else offers.walls, np.float64)
         self.goal_circle = offers.goal_circle
 
     def initial_state(self, seed: int | None = None) -> Array:
-        """Return the state [D] after `env.reset(seed=seed)`; the seed of the spec, where it has one, comes first."""
-        start_seed = self.spec.start_seed
-        self.env.reset(seed=seed if start_seed is None else start_seed)
+        """Return the state [D] after `env.reset`; seed and options of the spec, where it has some, come first."""
+        self.env.reset(seed=self.spec.reset_seed(seed), options=self.spec.reset_options)
         return np.array(self.env.get_env_state(), dtype=np.float64)
 
     def feature(self, states: Array) -> Array:
@@ -111,15 +109,6 @@ class Model:
             raise InvalidOption(f"{self.spec.id} cannot be steered: it has no `advance_towards(states, "
                                 f"targets)`; choose another planner")
         return self._offers.advance_towards(states, targets)
-
-
-def _spec_of(env: Any) -> EnvSpec:
-    """Return the id and the options of an environment: those that differ from what its id is registered with."""
-    if env.spec is None:
-        return EnvSpec(type(env).__qualname__)
-    registered = gymnasium.registry[env.spec.id].kwargs if env.spec.id in gymnasium.registry else {}
-    return EnvSpec(env.spec.id, {name: value for name, value in env.spec.kwargs.items()
-                                 if name != "render_mode" and repr(value) != repr(registered.get(name))})
 
 
 def _bounds(env: Any, low: Array, high: Array) -> tuple[Array, Array]:

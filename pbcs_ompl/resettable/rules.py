@@ -10,6 +10,7 @@ import numpy as np
 
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
 from pbcs_ompl.core.types import Array
+from pbcs_ompl.resettable.attributes import EnvAttributes
 
 
 class Outcome(NamedTuple):
@@ -49,6 +50,19 @@ def reported_success(outcome: Outcome) -> bool:
         if key in outcome.info:
             return bool(outcome.info[key])
     return bool(outcome.terminated and outcome.reward > 0)
+
+
+def granted_success(outcome: Outcome) -> bool:
+    """Return whether the environment grants its goal: by what it reports, else by the goal distance that it declares.
+
+    An environment with `goal_distance`, `goal_threshold` and `get_env_state` (see `attributes`) whose `info` says
+    nothing is asked for the distance of the state that it is in.
+    """
+    offered = EnvAttributes.of(outcome.env)
+    if "is_success" in outcome.info or "success" in outcome.info or offered.goal_distance is None:
+        return reported_success(outcome)
+    state = np.array(outcome.env.get_env_state(), dtype=np.float64)
+    return bool(offered.goal_distance(state[None])[0] < (offered.goal_threshold or 0.0))
 
 
 def rule_text(kind: str, rule: str | GoalRule | FeatureRule) -> str:

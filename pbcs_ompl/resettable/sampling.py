@@ -111,5 +111,5 @@ def _roll(model: ResettableModel, states: Array, rng: np.random.Generator, most:
         outcome = model.transition(states[moving], controls)
         counter.count += len(moving)
         states[moving] = outcome.states
-        ended[moving] = outcome.terminated
+        ended[moving] = outcome.ended
     return states[~ended]

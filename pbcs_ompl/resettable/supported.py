@@ -3,28 +3,9 @@
 from typing import Any
 
 import gymnasium
-import numpy as np
 from gymnasium import spaces
 
 from pbcs_ompl.core.errors import NotResettable, UnsupportedSpace
-
-
-def check_actions(env: gymnasium.Env) -> None:
-    """Refuse actions that are no finite vector Box.
-
-    Raises:
-        UnsupportedSpace: says the remedy.
-    """
-    action = env.action_space
-    if not isinstance(action, spaces.Box):
-        raise UnsupportedSpace(f"action space {action}: expected a Box, since controls are continuous; map a "
-                               f"Box to these actions inside the environment")
-    if len(action.shape) != 1:
-        raise UnsupportedSpace(f"action space of shape {action.shape}: expected a vector; reshape it "
-                               f"inside the environment")
-    if not (np.isfinite(action.low).all() and np.isfinite(action.high).all()):
-        raise UnsupportedSpace(f"action space {action}: expected finite bounds, since actions are sampled "
-                               f"uniformly; give the Box finite low and high")
 
 
 def check_observations(env: gymnasium.Env) -> None:

@@ -108,7 +108,7 @@ class SkillChain:
             if alive[0] == 0:
                 trace.append(states[0].copy())
             success[alive] = outcome.success
-            ended = outcome.success | outcome.terminated
+            ended = outcome.success | outcome.ended
             steps[alive[ended]] = step
             alive = alive[~ended]
             if not len(alive):

@@ -23,7 +23,8 @@ class Episodes:
         reached: Which episodes reached the target [B].
         steps: The length of each episode [B].
         states, controls, rewards, next_states, terminals: The transitions, [N, ...]. A transition is terminal when
-            it reached the target, or when the environment ended the episode.
+            it reached the target, or when the environment terminated; the value of what follows a truncated episode
+            counts.
     """
 
     reached: BoolArray
@@ -60,7 +61,7 @@ def run_episodes(model: ResettableModel, act: Act, target: Target, starts: Array
         success_reward: The reward for reaching the target, of the shaped reward; None for the environment's own reward.
 
     Source: [Matheron2020] Alg. 8. Differs: the episodes run side by side; each ends when the target is reached, the
-    environment terminates, or after `max_steps`.
+    environment ends it, or after `max_steps`.
     """
     states = starts.copy()
     alive = np.arange(len(starts))
@@ -72,12 +73,12 @@ def run_episodes(model: ResettableModel, act: Act, target: Target, starts: Array
         controls = with_random_actions(model, act(here), epsilon, rng)
         outcome = model.transition(here, controls)
         success = target.contains(model, outcome.states)
-        ended = success | outcome.terminated
+        ended = success | outcome.ended
         rewards = outcome.rewards
         if success_reward is not None:
             rewards = shaped_rewards(target.distance(model, here), target.distance(model, outcome.states), success,
                                      target.radius, success_reward)
-        parts.append((here, controls, rewards, outcome.states, ended))
+        parts.append((here, controls, rewards, outcome.states, success | outcome.terminated))
         states[alive] = outcome.states
         steps[alive] += 1
         reached[alive[success]] = True

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from model_env import ModelEnv
 
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.types import Array, BoolArray, Counter, Transition
@@ -25,9 +26,12 @@ class Square:
         self.feature_low, self.feature_high = np.zeros(2), np.full(2, 5.0)
         self.feature_dims, self.bin_size = feature_dims, np.full(2, 0.25)
         self.observation_size, self.goal_threshold, self.max_episode_steps = size, radius, 100
-        self.parallel_batch = 1
+        self.parallel_batch, self.episode_limit = 1, None
         self.walls, self.goal_circle = np.array([[2.0, 0.0, 2.2, 3.0]]), (goal, goal, radius)
         self.goal, self.start = np.array([goal, goal]), start
+
+    def make_env(self) -> ModelEnv:
+        return ModelEnv(self)
 
     def initial_state(self, seed: int | None = None) -> Array:
         state = np.zeros(len(self.state_low))

@@ -122,7 +122,7 @@ def test_equal_seeds_give_equal_paths_here_and_in_a_fresh_process(square, planne
     first = {seed: digest(planner, seed, model) for seed in (0, 1, 2)}
     assert len(set(first.values())) == 3
     assert {seed: digest(planner, seed, model) for seed in (2, 0, 1)} == first
-    program = ("import sys; sys.path.insert(0, sys.argv[1]); import conftest, test_problem; "
+    program = ("import sys; sys.path[:0] = [sys.argv[1], sys.argv[1] + '/..']; import conftest, test_problem; "
                "print(test_problem.digest(sys.argv[2], 2, conftest.Square()))")
     fresh = subprocess.run([sys.executable, "-c", program, str(request.path.parent), planner],
                            capture_output=True, text=True, check=True)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from model_env import ModelEnv
 from numba import njit
 from ompl import base as ob
 from ompl import control as oc
@@ -30,6 +31,7 @@ class Square:
 
     env, spec, capabilities = None, EnvSpec("tests/Square"), frozenset({"visited", "arbitrary", "exact"})
     observation_size, max_episode_steps, parallel_batch = 2, 50, 1
+    episode_limit: int | None = None
     walls, goal_circle = np.empty((0, 4)), None
     feature_dims: tuple[int, ...] | None = (0, 1)
 
@@ -41,6 +43,9 @@ class Square:
         self.action_low, self.action_high = np.full(2, -0.1), np.full(2, 0.1)
         self.feature_low, self.feature_high = self.state_low, self.state_high
         self.bin_size = np.full(2, 0.25)
+
+    def make_env(self) -> ModelEnv:
+        return ModelEnv(self)
 
     def initial_state(self, seed: int | None = None):
         return np.full(2, 0.5)

@@ -101,8 +101,8 @@ BOX = spaces.Box(-1.0, 1.0, (2,))
 
 
 @pytest.mark.parametrize(("action", "observation", "complaint"), [
-    (spaces.Discrete(3), BOX, "Discrete.*expected a Box"),
-    (spaces.MultiBinary(3), BOX, "expected a Box"),
+    (spaces.Text(3), BOX, "Text.*expected a Box"),
+    (spaces.Dict(push=BOX), BOX, "expected a Box"),
     (spaces.Box(-np.inf, np.inf, (2,)), BOX, "finite bounds"),
     (spaces.Box(-1.0, 1.0, (2, 2)), BOX, "expected a vector"),
     (BOX, spaces.Tuple([BOX]), "Dict of Boxes"),
@@ -134,7 +134,7 @@ def test_wrappers_of_limits_and_rewards_are_removed() -> None:
     lambda env: wrappers.FrameStackObservation(env, 2),
     lambda env: wrappers.NormalizeObservation(env),
     lambda env: wrappers.StickyAction(env, 0.5),
-    lambda env: wrappers.TimeAwareObservation(env),
+    lambda env: wrappers.TimeAwareObservation(wrappers.TimeLimit(env, 100)),
     lambda env: wrappers.DelayObservation(env, 2),
 ])
 def test_wrappers_with_a_memory_are_refused(wrap: object) -> None:

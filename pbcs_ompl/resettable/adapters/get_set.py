@@ -8,12 +8,13 @@ import numpy as np
 from pbcs_ompl.core.batches import check_batch
 from pbcs_ompl.core.errors import InvalidOption, InvalidState, NotResettable
 from pbcs_ompl.core.types import Array, BoolArray, Transition
+from pbcs_ompl.resettable.actions import Actions
 from pbcs_ompl.resettable.adapters.success_flag import as_vector, missing_observe, observes_state, state_bounds
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.model import Model
 
-Step = tuple[Array, float, bool]
-"""Next state [D], reward, terminated."""
+Step = tuple[Array, float, bool, bool]
+"""Next state [D], reward, terminated, truncated."""
 
 
 class GetSetStateModel(Model):
@@ -54,11 +55,15 @@ class GetSetStateModel(Model):
         after = np.array([step[0] for step in steps]).reshape(states.shape)
         rewards = np.array([step[1] for step in steps], dtype=np.float64)
         terminated = np.array([step[2] for step in steps], dtype=np.bool_)
-        return Transition(after, rewards, terminated, self.goal_distance(after) < self.goal_threshold)
+        truncated = np.array([step[3] for step in steps], dtype=np.bool_)
+        return Transition(after, rewards, terminated, self.goal_distance(after) < self.goal_threshold, truncated)
 
     def step_one(self, state: list[float], control: list[float]) -> list[float]:
-        """Return the next state of one state."""
-        following: list[float] = self.transition(np.array([state]), np.array([control])).states[0].tolist()
+        """Return the next state of one state; empty where the episode ends there and is no success."""
+        outcome = self.transition(np.array([state]), np.array([control]))
+        if outcome.ended[0] and not outcome.success[0]:
+            return []
+        following: list[float] = outcome.states[0].tolist()
         return following
 
     def observe(self, states: Array) -> Array:
@@ -78,14 +83,14 @@ class GetSetStateModel(Model):
         return valid
 
     def _steps(self, states: Array, controls: Array) -> list[Step]:
-        return self._loop(self.env, states, controls)
+        return self._loop(self.env, states, self.actions.to_actions(controls))
 
     @staticmethod
-    def _loop(env: Any, states: Array, controls: Array) -> list[Step]:
+    def _loop(env: Any, states: Array, actions: Actions) -> list[Step]:
         """Step `env` from one state after the other."""
-        steps, dtype = [], env.action_space.dtype
-        for state, control in zip(states, controls, strict=True):
+        steps = []
+        for state, action in zip(states, actions, strict=True):
             env.set_env_state(state.copy())
-            _, reward, terminated, _, _ = env.step(control.astype(dtype))
-            steps.append((as_vector(env, env.get_env_state()), float(reward), bool(terminated)))
+            _, reward, terminated, truncated, _ = env.step(action)
+            steps.append((as_vector(env, env.get_env_state()), float(reward), bool(terminated), bool(truncated)))
         return steps

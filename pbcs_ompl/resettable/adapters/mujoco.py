@@ -151,11 +151,11 @@ class MujocoModel(GetSetStateModel):
             return super()._steps(states, controls)
         if self._pool is None:
             self._open_pool()
-        envs = [self.env, *self._others][:len(states)]
+        envs, actions = [self.env, *self._others][:len(states)], self.actions.to_actions(controls)
         cuts = np.linspace(0, len(states), len(envs) + 1).astype(int)
-        jobs = [self._pool.submit(self._loop, env, states[a:b], controls[a:b])  # type: ignore[union-attr]
+        jobs = [self._pool.submit(self._loop, env, states[a:b], actions[a:b])  # type: ignore[union-attr]
                 for env, a, b in zip(envs[1:], cuts[1:-1], cuts[2:], strict=True)]
-        done = self._loop(envs[0], states[:cuts[1]], controls[:cuts[1]])
+        done = self._loop(envs[0], states[:cuts[1]], actions[:cuts[1]])
         return done + [step for job in jobs for step in job.result()]
 
     def _open_pool(self) -> None:

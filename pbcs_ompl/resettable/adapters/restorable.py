@@ -10,6 +10,8 @@ from gymnasium.spaces import Box
 
 from pbcs_ompl.core.errors import CallbackFailed
 from pbcs_ompl.core.types import Array, Capability
+from pbcs_ompl.resettable.actions import ActionMap
+from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rules import (
     FeatureRule,
     GoalRule,
@@ -173,13 +175,6 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         return success
 
 
-def flat(observation: Any) -> Array:
-    """Return an observation as one vector; the entries of a dictionary in the order of their names."""
-    if isinstance(observation, dict):
-        return np.concatenate([flat(observation[key]) for key in sorted(observation)])
-    return np.array(observation, dtype=np.float64).ravel()
-
-
 MARGIN = 1.0
 """What random steps have not reached is expected within this many times their range."""
 
@@ -197,13 +192,14 @@ def feature_bounds(env: Any, steps: int) -> tuple[Array, Array, str]:
     size = len(env.feature_dims)
     declared = _declared(env.inner.observation_space)
     rng = np.random.default_rng(0)
-    space = env.action_space
+    actions = ActionMap.of(env.action_space)
     features, is_observation = [env.get_env_state()[:size]], _same(env.get_env_state()[:size], first)
     for _ in range(steps):
-        observation, _, terminated, _, _ = env.step(rng.uniform(space.low, space.high).astype(space.dtype))
+        action = actions.to_action(rng.uniform(actions.low, actions.high))
+        observation, _, terminated, truncated, _ = env.step(action)
         features.append(env.get_env_state()[:size])
         is_observation = is_observation and _same(features[-1], observation)
-        if terminated:
+        if terminated or truncated:
             env.reset(seed=int(rng.integers(2**31)))
     if is_observation and declared is not None:
         return *declared, "the observation space"

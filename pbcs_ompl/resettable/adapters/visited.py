@@ -15,7 +15,9 @@ import numpy as np
 
 from pbcs_ompl.core.errors import InvalidState, NotResettable
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.resettable.adapters.restorable import RestorableEnv, flat
+from pbcs_ompl.resettable.actions import ActionMap
+from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.observations import flat
 
 FIRST_HASH = float(2**32)
 """Smaller numbers are seeds."""
@@ -162,9 +164,9 @@ def check_replays(env: Any) -> None:
                               f"lead elsewhere, so its steps are random; make the randomness part of its state")
 
 
-def _action(env: Any, rng: np.random.Generator) -> Array:
-    action: Array = rng.uniform(env.action_space.low, env.action_space.high).astype(env.action_space.dtype)
-    return action
+def _action(env: Any, rng: np.random.Generator) -> Any:
+    actions = ActionMap.of(env.action_space)
+    return actions.to_action(rng.uniform(actions.low, actions.high))
 
 
 def _walk(env: Any, actions: list[Array]) -> list[bytes]:

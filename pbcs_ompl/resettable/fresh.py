@@ -1,0 +1,75 @@
+"""Fresh environments of a task: made by Gymnasium from its id, or copied from an object before anything ran in it."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from typing import Any
+
+import gymnasium
+from gymnasium.wrappers import TimeLimit
+
+from pbcs_ompl.core.env_spec import EnvSpec
+
+EnvMaker = Callable[[], gymnasium.Env[Any, Any]]
+"""Makes an environment in which nothing has run yet, with all of its wrappers."""
+
+
+def fresh_maker(env: gymnasium.Env[Any, Any], max_episode_steps: int | None = None) -> EnvMaker | None:
+    """Return what makes environments equal to `env`; call it before anything runs in `env`.
+
+    That is a deep copy of `env`, else Gymnasium from its registered id; None where neither works.
+
+    Args:
+        env: An environment, wrapped or not.
+        max_episode_steps: The limit of episodes in place of that of `env`; None to leave it.
+    """
+    try:
+        pristine = deepcopy(env)
+        deepcopy(pristine)
+    except Exception:  # whatever a foreign class raises when it is copied
+        return _maker_by_spec(env, max_episode_steps)
+    return lambda: limited(deepcopy(pristine), max_episode_steps)
+
+
+def _maker_by_spec(env: gymnasium.Env[Any, Any], max_episode_steps: int | None) -> EnvMaker | None:
+    spec = env.spec
+    if spec is None or spec.id not in gymnasium.registry:
+        return None
+    return lambda: limited(gymnasium.make(spec, disable_env_checker=True), max_episode_steps)
+
+
+def limited(env: gymnasium.Env[Any, Any], max_episode_steps: int | None) -> gymnasium.Env[Any, Any]:
+    """Return `env` with episodes of that many steps; as it is for None."""
+    if max_episode_steps is None:
+        return env
+    wrapper = _time_limit(env)
+    if wrapper is None:
+        return TimeLimit(env, max_episode_steps)
+    wrapper._max_episode_steps = max_episode_steps
+    return env
+
+
+def episode_limit(env: gymnasium.Env[Any, Any]) -> int | None:
+    """Return after how many steps a wrapper of `env` cuts an episode off; None where none does."""
+    wrapper = _time_limit(env)
+    return None if wrapper is None else wrapper._max_episode_steps
+
+
+def _time_limit(env: gymnasium.Env[Any, Any]) -> TimeLimit[Any, Any] | None:
+    while isinstance(env, gymnasium.Wrapper):
+        if isinstance(env, TimeLimit):
+            return env
+        env = env.env
+    return None
+
+
+def spec_of(env: gymnasium.Env[Any, Any]) -> EnvSpec:
+    """Return the id and the options of an environment: those that differ from what its id is registered with.
+
+    One that was not made by `gymnasium.make` has no id; its class's name stands in, from which it cannot be made again.
+    """
+    if env.spec is None:
+        return EnvSpec(type(env.unwrapped).__qualname__)
+    registered = gymnasium.registry[env.spec.id].kwargs if env.spec.id in gymnasium.registry else {}
+    return EnvSpec(env.spec.id, {name: value for name, value in env.spec.kwargs.items()
+                                 if name != "render_mode" and repr(value) != repr(registered.get(name))})
+

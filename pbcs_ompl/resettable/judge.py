@@ -1,0 +1,202 @@
+"""The judge: executes actions and controllers in fresh environments, through Gymnasium's `reset` and `step` alone.
+
+Everything that is called solved, and every success rate, comes from here. The resettable model, in which planners
+search and agents train, has no part in it.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import gymnasium
+import numpy as np
+
+from pbcs_ompl.core.callbacks import callback_failed
+from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.errors import NotVerified, PbcsError
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.types import Array
+from pbcs_ompl.resettable.actions import ActionMap
+from pbcs_ompl.resettable.fresh import EnvMaker
+from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.rules import GoalRule, Outcome, goal_rule, granted_success
+
+SIDE_BY_SIDE = 20
+"""Episodes that a controller drives at the same time, each in an environment of its own."""
+Ending = Literal["goal", "terminated", "truncated", "end of the actions", "time limit"]
+
+
+class Controller(Protocol):
+    """What drives an environment by its observations alone."""
+
+    def reset(self, count: int | None = None) -> None:
+        """Begin `count` episodes side by side; None for one, whose observations are vectors and not batches."""
+        ...
+
+    def act(self, observation: Any) -> Any:
+        """Return controls [B, A] for observations [B, O]; of one episode [A] for [O]."""
+        ...
+
+
+@dataclass(frozen=True)
+class Execution:
+    """One episode in a fresh environment.
+
+    Attributes:
+        success: Whether the environment granted the goal, in the reset or in a step before the episode was over.
+        steps: How many steps were made.
+        ending: Why the episode ended.
+        rewards: The rewards [T].
+        observations: The observations as vectors [T+1, O]; None where they were not asked for.
+    """
+
+    success: bool
+    steps: int
+    ending: Ending
+    rewards: Array
+    observations: Array | None = None
+
+
+class Judge:
+    """Executes in environments of one task.
+
+    Args:
+        spec: The task: its goal, its start seed and the options of its resets.
+        make_env: Makes fresh environments; None where that is not possible.
+
+    Raises:
+        NotVerified: it is not possible.
+    """
+
+    def __init__(self, spec: EnvSpec, make_env: EnvMaker | None):
+        if make_env is None:
+            raise NotVerified(f"not verified: no fresh environment of {spec.id} can be made; register it with "
+                              f"Gymnasium, or make it possible to copy it (copy.deepcopy)")
+        self._spec, self._make_env = spec, make_env
+        self._rule: GoalRule = granted_success if spec.goal is None else goal_rule(spec.goal)
+
+    @classmethod
+    def of(cls, model: ResettableModel) -> "Judge":
+        """Return the judge of a model's task.
+
+        Raises:
+            NotVerified: no fresh environment of it can be made.
+        """
+        return cls(model.spec, model.make_env)
+
+    def execute(self, actions: Sequence[Any] | np.ndarray, reset_seed: int | None) -> Execution:
+        """Execute actions [T, ...], members of the action space, in a fresh environment.
+
+        Args:
+            actions: One for each step.
+            reset_seed: The seed of the reset; that of the task, where it has one, comes first.
+
+        Raises:
+            CallbackFailed: the environment raised.
+        """
+        episode = _Episode(self._make_env(), self._spec, self._rule, reset_seed)
+        try:
+            for action in actions:
+                if episode.ending is not None:
+                    break
+                episode.step(action)
+        finally:
+            episode.env.close()
+        return episode.execution("end of the actions", observed=True)
+
+    def drive(self, controller: Controller, *, episodes: int, reset_seed: int | None, max_steps: int,
+              epsilon: float = 0.0, seed: int = 0) -> list[Execution]:
+        """Let a controller of observations drive episodes.
+
+        Args:
+            controller: Gets the observations as vectors.
+            episodes: How many.
+            reset_seed: The seed of every reset; that of the task, where it has one, comes first.
+            max_steps: Steps after which an episode has failed, beside the limits of the environment itself.
+            epsilon: Fraction of actions that are replaced by random ones.
+            seed: Of these.
+
+        Raises:
+            CallbackFailed: the environment raised.
+        """
+        seeds = SeedTree(seed).child("evaluation")
+        results: list[Execution] = []
+        envs: list[gymnasium.Env[Any, Any]] = []
+        try:
+            while len(results) < episodes:
+                first = len(results)
+                count = min(SIDE_BY_SIDE, episodes - first)
+                envs += [self._make_env() for _ in range(count - len(envs))]
+                begun = [_Episode(env, self._spec, self._rule, reset_seed) for env in envs[:count]]
+                noise = [seeds.child(str(first + k)).generator() for k in range(count)]
+                results += _drive(controller, begun, noise, epsilon, max_steps)
+        finally:
+            for env in envs:
+                env.close()
+        return results
+
+
+class _Episode:
+    """An episode that goes on: the last outcome, and what has been seen so far."""
+
+    def __init__(self, env: gymnasium.Env[Any, Any], spec: EnvSpec, rule: GoalRule, reset_seed: int | None):
+        self.env, self._rule = env, rule
+        self.ending: Ending | None = None
+        self._rewards: list[float] = []
+        try:
+            observation, info = env.reset(seed=spec.reset_seed(reset_seed), options=spec.reset_options)
+            outcome = Outcome(env.unwrapped, observation, math.nan, False, info)
+            if rule(outcome):
+                self.ending = "goal"
+        except PbcsError:
+            raise
+        except Exception as error:
+            raise callback_failed(error, "the environment") from error
+        self._observations = [flat(observation)]
+
+    @property
+    def observation(self) -> Array:
+        """The last observation [O]."""
+        return self._observations[-1]
+
+    def step(self, action: Any) -> None:
+        """Make one step with a copy of an action."""
+        try:
+            observation, reward, terminated, truncated, info = self.env.step(np.array(action)[()])
+            success = self._rule(Outcome(self.env.unwrapped, observation, float(reward), bool(terminated), info))
+        except PbcsError:
+            raise
+        except Exception as error:
+            raise callback_failed(error, "the environment") from error
+        self._rewards.append(float(reward))
+        self._observations.append(flat(observation))
+        if success:
+            self.ending = "goal"
+        elif terminated or truncated:
+            self.ending = "terminated" if terminated else "truncated"
+
+    def execution(self, otherwise: Ending, *, observed: bool = False) -> Execution:
+        """Return what happened; the episode ended for the reason `otherwise` if for none of its own."""
+        return Execution(self.ending == "goal", len(self._rewards), self.ending or otherwise,
+                         np.array(self._rewards), np.array(self._observations) if observed else None)
+
+
+def _drive(controller: Controller, episodes: list[_Episode], noise: list[np.random.Generator], epsilon: float,
+           max_steps: int) -> list[Execution]:
+    """Let a controller drive episodes side by side until all have ended."""
+    actions = ActionMap.of(episodes[0].env.action_space)
+    controller.reset(len(episodes))
+    for _ in range(max_steps):
+        going = [k for k, episode in enumerate(episodes) if episode.ending is None]
+        if not going:
+            break
+        controls = np.array(controller.act(np.array([episode.observation for episode in episodes])), np.float64)
+        for k in going:
+            if epsilon > 0 and noise[k].random() < epsilon:
+                controls[k] = noise[k].uniform(actions.low, actions.high)
+        chosen = actions.to_actions(controls)
+        for k in going:
+            episodes[k].step(chosen[k])
+    return [episode.execution("time limit") for episode in episodes]
