@@ -67,8 +67,12 @@ class Trajectory:
                      actions=self.actions, rewards=self.rewards)
 
     @classmethod
-    def load(cls, path: str | Path) -> "Trajectory":
+    def load(cls, path: str | Path, *, trust: bool = False) -> "Trajectory":
         """Read what `save` has written.
+
+        Args:
+            path: The file.
+            trust: Let the environment be made from what the file says where that imports a module.
 
         Raises:
             DamagedFile: the file is missing, truncated, of another version, or not ours.
@@ -86,17 +90,17 @@ class Trajectory:
         if version != FORMAT:
             raise DamagedFile(f"{path} has format {version}, this version of pbcs_ompl reads format {FORMAT}: "
                               "plan again, or install the version that wrote it")
-        return cls._checked(path, words, arrays)
+        return cls._checked(path, words, arrays, trust)
 
     @classmethod
-    def _checked(cls, path: Path, words: dict[str, Any], arrays: dict[str, np.ndarray]) -> "Trajectory":
+    def _checked(cls, path: Path, words: dict[str, Any], arrays: dict[str, np.ndarray], trust: bool) -> "Trajectory":
         states, actions, rewards = arrays["states"], arrays["actions"], arrays["rewards"]
         steps = len(rewards) if rewards.ndim else -1
         if states.ndim != 2 or actions.ndim not in (1, 2) or len(states) != steps + 1 or len(actions) != steps:
             raise DamagedFile(f"{path} is damaged: states {states.shape}, actions {actions.shape}, rewards "
                               f"{rewards.shape}; expected [T+1, D], [T, ...], [T]")
         try:
-            environment = EnvSpec.from_dict(words.pop("environment"))
+            environment = EnvSpec.from_dict(words.pop("environment"), trusted=trust)
             return cls(environment, states=states, actions=actions, rewards=rewards, **words)
         except (KeyError, TypeError) as error:
             raise DamagedFile(f"{path} is not a trajectory: {error}") from error

@@ -60,7 +60,7 @@ def _identity(run: Run) -> Record:
 
 def _plan(settings: dict[str, Any], **limits: Any) -> PlanResult:
     chosen = {name: settings[name] for name in ("planner_kwargs", "seed", "max_transitions", "max_seconds")} | limits
-    return plan(EnvSpec.from_dict(settings["environment"]), settings["planner"], coverage=True, **chosen)
+    return plan(EnvSpec.from_dict(settings["environment"], trusted=True), settings["planner"], coverage=True, **chosen)
 
 
 def _coverage(coverage: Coverage | None) -> Record:

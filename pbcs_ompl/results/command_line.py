@@ -47,17 +47,30 @@ def train_words(config: dict[str, Any], trajectory: Path | None = None) -> Words
             *_json_words("--agent-settings", config["agent_settings"]), *_budgets(config)]
 
 
-def resume_words(folder: Path, max_transitions: int | None = None) -> Words:
-    """Return the words that resume a training in a folder, with another budget if one is given."""
+def resume_words(folder: Path, max_transitions: int | None = None, *, trust: bool = False) -> Words:
+    """Return the words that resume a training in a folder.
+
+    Args:
+        folder: The folder.
+        max_transitions: Another budget; None for the old one.
+        trust: Import the modules that the folder names.
+    """
     budget = [] if max_transitions is None else ["--max-transitions", str(max_transitions)]
-    return ["train", "--resume", str(folder), *budget]
+    return ["train", "--resume", str(folder), *budget, *_trust(trust)]
 
 
-def eval_words(folder: str | Path, *, episodes: int | None = None, epsilon: float | None = None) -> Words:
-    """Return the words of an evaluation of the chain in a folder; what is None is left out."""
+def eval_words(folder: str | Path, *, episodes: int | None = None, epsilon: float | None = None,
+               trust: bool = False) -> Words:
+    """Return the words of an evaluation of the chain in a folder.
+
+    Args:
+        folder: The folder.
+        episodes, epsilon: Options; None to leave them out.
+        trust: Import the modules that the folder names.
+    """
     options = {"--episodes": episodes, "--epsilon": epsilon}
     return ["eval", str(folder), *(word for name, value in options.items() if value is not None
-                                   for word in (name, str(value)))]
+                                   for word in (name, str(value))), *_trust(trust)]
 
 
 def compare_words(config: dict[str, Any]) -> Words:
@@ -83,6 +96,10 @@ def study_words(study: str | Path, *, seeds: int | None = None, device: str | No
 def report_words(folder: Path) -> Words:
     """Return the words that write the report of a folder."""
     return ["report", str(folder)]
+
+
+def _trust(trust: bool) -> Words:
+    return ["--trust"] if trust else []
 
 
 def _environment(config: dict[str, Any]) -> Words:

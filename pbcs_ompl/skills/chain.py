@@ -141,8 +141,12 @@ class SkillChain:
             "skills": [{"activation": kind_of(s.activation), "target": kind_of(s.target)} for s in self.skills]})
 
     @classmethod
-    def load(cls, folder: str | Path) -> "SkillChain":
+    def load(cls, folder: str | Path, *, trust: bool = False) -> "SkillChain":
         """Read a chain that `save` wrote.
+
+        Args:
+            folder: The folder.
+            trust: Let its environment be made where that imports a module which the folder names.
 
         Raises:
             DamagedFile: a file is missing, truncated, or of another version.
@@ -160,7 +164,8 @@ class SkillChain:
                 Skill(policy, from_arrays(entry["activation"], arrays, f"activation{index}"),
                       from_arrays(entry["target"], arrays, f"target{index}"))
                 for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
-            return cls(skills, arrays["start"], EnvSpec.from_dict(structure["environment"]), structure["time_limit"])
+            environment = EnvSpec.from_dict(structure["environment"], trusted=trust)
+            return cls(skills, arrays["start"], environment, structure["time_limit"])
         except (KeyError, ValueError) as error:
             raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error
 
