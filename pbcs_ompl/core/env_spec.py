@@ -3,11 +3,25 @@
 import json
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Annotated, Any, NotRequired, TypedDict
+
+import msgspec
 
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.trust import is_module_name, module_names, refuse_modules
+
+
+class EnvValues(TypedDict):
+    """An `EnvSpec` as files hold it."""
+
+    id: Annotated[str, msgspec.Meta(min_length=1)]
+    kwargs: NotRequired[dict[str, Any]]
+    goal: NotRequired[str]
+    feature: NotRequired[str]
+    start_seed: NotRequired[Annotated[int, msgspec.Meta(ge=0)]]
+    reset_options: NotRequired[dict[str, Any]]
+    max_episode_steps: NotRequired[Annotated[int, msgspec.Meta(ge=1)]]
 
 
 @dataclass(frozen=True)
@@ -97,8 +111,9 @@ class EnvSpec:
             DamagedFile: it was none.
         """
         try:
+            msgspec.convert(values, EnvValues)
             return cls(**values, trusted=trusted)
-        except (TypeError, InvalidOption) as error:
+        except (TypeError, InvalidOption, msgspec.ValidationError) as error:
             raise DamagedFile(f"the environment {values!r} is damaged: {error}") from error
 
     def same_as(self, other: "EnvSpec") -> bool:

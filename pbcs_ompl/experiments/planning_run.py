@@ -44,9 +44,17 @@ def failed_record(run: Run, failure: Failure) -> Record:
     return {**_identity(run), "solved": False, **dict.fromkeys(MEASURED), "reason": failure.reason}
 
 
-def is_record_of(name: str, record: Record) -> bool:
-    """Return whether this is a record of the run of this name."""
-    return record.get("name") == name and record.keys() >= {*IDENTITY, *MEASURED, "solved", "reason"}
+def is_record_of(run: Run, record: Record) -> bool:
+    """Return whether a record is that of this run, and says no more than a run can find.
+
+    Args:
+        run: The run.
+        record: A `RunOfComparison`, by its types.
+    """
+    same = all(record[name] == value for name, value in _identity(run).items())
+    needed = ("transitions", "seconds", "path_length") if record["solved"] else ()
+    lengths = {len(numbers) for numbers in (record["progress"] or {}).values()}
+    return same and all(record[name] is not None for name in needed) and len(lengths) <= 1
 
 
 def folder_of(record: Record) -> str:

@@ -15,7 +15,9 @@ from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.options import check_names, check_range, check_types
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.trust import is_module_name, module_names, refuse_modules
+from pbcs_ompl.results import schema
 from pbcs_ompl.results.files import read_toml
+from pbcs_ompl.results.schema import check
 from pbcs_ompl.skills.agent_interface import Agent, AgentSettingsValues, load_agent
 from pbcs_ompl.skills.method import TrainingMethod
 from pbcs_ompl.skills.pbcs import PBCS, PBCSSettings
@@ -219,6 +221,7 @@ def read_config(path: Path, *, trust: bool = False) -> tuple[EnvSpec, TrainConfi
     values = read_toml(path)
     if values.get("kind") != "train":
         raise DamagedFile(f"{path} is not that of a training: its kind is {values.get('kind')!r}; expected 'train'")
+    check(path, values, schema.TrainConfig)
     try:
         environment = EnvSpec.from_dict(values.get("environment"), trusted=trust)
         if not trust:

@@ -20,6 +20,7 @@ from pbcs_ompl.core.types import Array, Counter, ProgressCallback
 from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, read_json, read_toml, write_json
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.results.provenance import planning_versions
+from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.config import METHODS, TrainConfig
 from pbcs_ompl.skills.evaluation import Evaluation, evaluate
@@ -121,7 +122,7 @@ class Training:
         if self.path and self.resumed and (self.path / PLAN).is_file():
             trajectory = Trajectory.load(self.path / TRAJECTORY)
             self._check_replays(trajectory)
-            return trajectory, read_json(self.path / PLAN)["transitions"]
+            return trajectory, read_json(self.path / PLAN, PlanEffort)["transitions"]
         transitions = 0
         if self.config.planner is not None:
             found = plan(self.model, self.config.planner, planner_kwargs=self.config.planner_kwargs,

@@ -1,4 +1,4 @@
-"""What others wrote is data: a module that a folder names, and all that lies beside it, is imported only when trusted."""
+"""What others wrote is data: a module that a folder names, or that lies beside it, is imported only when trusted."""
 
 import os
 import shutil

@@ -22,6 +22,7 @@ from pbcs_ompl.results.command_line import (
 )
 from pbcs_ompl.results.files import CHECKPOINT, PLAN, TRAJECTORY, read_json, read_toml
 from pbcs_ompl.results.folder import Folder
+from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.config import config_modules
 
 
@@ -93,7 +94,7 @@ def _words(folder: Folder) -> Words:
 
 def _given_trajectory(folder: Path) -> Path | None:
     """Return the trajectory that a training was given; None where it was planned, which takes a transition at least."""
-    given = (folder / PLAN).is_file() and read_json(folder / PLAN)["transitions"] == 0
+    given = (folder / PLAN).is_file() and read_json(folder / PLAN, PlanEffort)["transitions"] == 0
     return folder / TRAJECTORY if given else None
 
 
