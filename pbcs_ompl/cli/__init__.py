@@ -14,6 +14,7 @@ from typing import Any
 
 from pbcs_ompl.cli.arguments import build_parser, parse
 from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.formatting import one_line
 from pbcs_ompl.core.trust import module_names
 
 
@@ -45,12 +46,12 @@ def _imports(arguments: Namespace) -> bool:
 
 
 def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
-    print("pbcs: warning:", " ".join(str(message).split()), file=sys.stderr)
+    print("pbcs: warning:", one_line(str(message)), file=sys.stderr)
 
 
 def _complain(error: BaseException, message: str, status: int) -> int:
     """Print one line, and let go of what the failed call held: OMPL's bindings list it as leaked at exit."""
-    print("pbcs:", " ".join(message.split()), file=sys.stderr)
+    print("pbcs:", one_line(message), file=sys.stderr)
     link: BaseException | None = error
     while link is not None:
         traceback.clear_frames(link.__traceback__)

@@ -11,7 +11,7 @@ from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from pbcs_ompl.core.formatting import format_duration, format_number
+from pbcs_ompl.core.formatting import format_duration, format_number, one_line, printable
 from pbcs_ompl.core.plain import plain
 
 SECONDS_BETWEEN_LINES = 10.0
@@ -73,7 +73,7 @@ class ProgressDisplay:
             self._last_line = now
             rows = ("  " + ", ".join(f"{name} {format_number(value)}" for name, value in row.items())
                     for row in numbers.get("table", []))
-            print(text, *rows, sep="\n", file=sys.stderr, flush=True)
+            print(*map(printable, [text, *rows]), sep="\n", file=sys.stderr, flush=True)
 
     def _share(self, numbers: dict[str, Any], seconds: float) -> float | None:
         """Return the share that is done, in [0, 1]; None if unknown."""
@@ -110,7 +110,7 @@ def print_summary(result: dict[str, Any], lines: Sequence[tuple[str, str]], *, a
     """Print the closing summary, and the JSON object as the last line on stdout if it was asked for."""
     stream = sys.stderr if as_json else sys.stdout
     for name, text in lines:
-        print(f"{name:<9} {text}", file=stream)
+        print(printable(f"{name:<9} {text}"), file=stream)
     if as_json:
         stream.flush()
         print(json.dumps(result, default=plain), flush=True)
@@ -118,7 +118,8 @@ def print_summary(result: dict[str, Any], lines: Sequence[tuple[str, str]], *, a
 
 def warn(message: str) -> None:
     """Print one line on stderr."""
-    print("pbcs:", " ".join(message.split()), file=sys.stderr)
+    print("pbcs:", one_line(message), file=sys.stderr)
+
 
 
 def list_files(folder: Path) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.formatting import is_printable
 from pbcs_ompl.core.plain import plain
 
 Words = list[str]
@@ -17,8 +18,21 @@ BUDGETS = ("max_transitions", "max_seconds", "max_memory")
 
 
 def command(words: Sequence[str]) -> str:
-    """Return a command line, quoted for a shell."""
-    return shlex.join(["pbcs", *words])
+    """Return a command line of ours, quoted for a shell."""
+    return shell("pbcs", *words)
+
+
+def shell(*words: str) -> str:
+    """Return words quoted for a shell, in one line without characters that a terminal obeys."""
+    return " ".join(map(_quoted, words))
+
+
+def _quoted(word: str) -> str:
+    if is_printable(word):
+        return shlex.quote(word)
+    bytes_in_word = word.encode(errors="surrogateescape")
+    letters = (chr(byte) if 32 <= byte < 127 and chr(byte) not in "'\\" else f"\\{byte:03o}" for byte in bytes_in_word)
+    return f"$'{''.join(letters)}'"
 
 
 def environment_words(spec: EnvSpec) -> Words:
