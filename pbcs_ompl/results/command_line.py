@@ -8,9 +8,9 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from unicodedata import category
 
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.formatting import is_printable
 from pbcs_ompl.core.plain import plain
 
 Words = list[str]
@@ -23,12 +23,12 @@ def command(words: Sequence[str]) -> str:
 
 
 def shell(*words: str) -> str:
-    """Return words quoted for a shell, in one line without characters that a terminal obeys."""
+    """Return words quoted for a shell, in one line without control characters."""
     return " ".join(map(_quoted, words))
 
 
 def _quoted(word: str) -> str:
-    if is_printable(word):
+    if not any(category(letter) in ("Cc", "Cs") for letter in word):
         return shlex.quote(word)
     bytes_in_word = word.encode(errors="surrogateescape")
     letters = (chr(byte) if 32 <= byte < 127 and chr(byte) not in "'\\" else f"\\{byte:03o}" for byte in bytes_in_word)

@@ -233,9 +233,11 @@ def lock(path: Path, *, wait: bool = False) -> Iterator[None]:
         wait: Wait until no other process holds it.
 
     Raises:
-        RunFolderError: another process holds it.
+        RunFolderError: another process holds it, or it is a link, which would lead elsewhere.
         OSError: the file cannot be written, or its disk supports no locks.
     """
+    if path.is_symlink():
+        raise RunFolderError(f"{path} is a link; remove it, or choose another --out")
     file = FileLock(path, thread_local=False, poll_interval=POLL_SECONDS, fallback_to_soft=False)
     try:
         file.acquire(timeout=-1 if wait else 0)

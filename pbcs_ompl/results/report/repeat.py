@@ -102,7 +102,9 @@ def _study_words(config: dict[str, Any]) -> Words:
     """Return nothing if no study that is available has this name and this sweep: it would be another study."""
     sweep = {key: value for key, value in config.items() if key not in ("kind", "study", "folder", "seeds")}
     places = [(name, place) for name, place in study_folders().items() if name == config["study"]]
-    places += [(config["folder"], Path(config["folder"]))] if "folder" in config else []
+    if "folder" in config:
+        folder = Path(config["folder"]).expanduser()
+        places.append((str(folder), folder))
     device = {key: sweep[key] for key in ("device",) if key in sweep}  # the only value that an option replaces
     words = [word for word, place in places if (place / SWEEP).is_file() and _sweep(place) | device == sweep]
     return study_words(words[0], seeds=config.get("seeds"), **device) if words else []
