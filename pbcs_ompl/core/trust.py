@@ -1,4 +1,4 @@
-"""Names of code that stand in files: a file of somebody else must not decide what is imported.
+"""Names of code that stand in files: a file of another person must not decide what is imported.
 
 Environments, planners, agents and rules may be called `module:name`, which imports `module`. A user who types such a
 name means it. A name that was read from a file is refused, unless the user says that the file is trusted.

@@ -31,7 +31,7 @@ RUNS, FIGURES = "runs", "figures"
 """pbcs compare and pbcs study: the folders of the records, and of the pictures of a study."""
 Content = TypeVar("Content")
 MOST_BYTES, MOST_ARRAY_BYTES, MOST_ARRAYS = 1 << 28, 1 << 33, 100_000
-"""What is read of one file, so that a small file of somebody else does not fill the memory."""
+"""What is read of one file, so that a small file of another person does not fill the memory."""
 
 
 @contextmanager

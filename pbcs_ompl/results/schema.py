@@ -185,6 +185,35 @@ class RunOfStudy(TypedDict):
     seeds: NotRequired[list[Count]]
 
 
+class Versioned(TypedDict):
+    """The beginning of the words in a trajectory."""
+
+    format: int
+
+
+class TrajectoryWords(Versioned):
+    """The words in a trajectory."""
+
+    environment: EnvValues
+    planner: str
+    seed: Count
+    reset_seed: Count | None
+    versions: Versions
+
+
+class CheckpointVersion(TypedDict):
+    """The beginning of the words in a checkpoint."""
+
+    version: int
+
+
+class CheckpointWords(CheckpointVersion):
+    """The words in a checkpoint: the seconds of training before it, and the state of the method."""
+
+    seconds: Seconds
+    plain: Table
+
+
 class PlanEffort(TypedDict):
     """plan.json of a training."""
 

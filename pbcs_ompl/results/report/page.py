@@ -87,7 +87,7 @@ def _shown(path: Path, root: Path, number: int, templates: Environment, single: 
         if single:
             raise
         section = damaged_section(path, root, str(error))
-    except Exception as error:  # whatever a folder of somebody else may hold
+    except Exception as error:  # whatever a folder of another person may hold
         if single:
             raise DamagedFile(f"{path} cannot be shown: {error!r}") from error
         section = damaged_section(path, root, f"{path} cannot be shown: {error!r}")

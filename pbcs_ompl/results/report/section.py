@@ -84,7 +84,7 @@ def make_section(path: Path, root: Path) -> Section:
 
 
 def _check_inside(folder: Path, files: list[Path]) -> None:
-    """Refuse links that lead out of a folder: somebody else's folder must not show what is on this machine.
+    """Refuse links that lead out of a folder: the folder of another person must not show what is on this machine.
 
     Raises:
         DamagedFile: there is one.
