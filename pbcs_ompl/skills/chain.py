@@ -9,14 +9,11 @@ from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.results.files import read_arrays, read_json, write_arrays, write_json
 from pbcs_ompl.skills.activation_sets import ActivationSet, Target, from_arrays, kind_of, to_arrays
+from pbcs_ompl.skills.chain_files import read_chain, write_chain
 from pbcs_ompl.skills.episodes import with_random_actions
-from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
+from pbcs_ompl.skills.policy import SkillPolicy
 from pbcs_ompl.skills.waypoints import Waypoints
-
-FORMAT = "pbcs_ompl skill chain"
-VERSION = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,16 +126,13 @@ class SkillChain:
 
     def save(self, folder: str | Path) -> None:
         """Write chain.json (structure), chain.npz (activation sets and targets) and chain.safetensors (policies)."""
-        folder = Path(folder)
-        save_policies(folder / "chain.safetensors", [skill.policy for skill in self.skills])
         arrays = {"start": self.start}
         for index, skill in enumerate(self.skills):
             arrays |= to_arrays(skill.activation, f"activation{index}") | to_arrays(skill.target, f"target{index}")
-        write_arrays(folder / "chain.npz", **arrays)
-        write_json(folder / "chain.json", {
-            "format": FORMAT, "version": VERSION, "environment": self.environment.to_dict(),
-            "time_limit": self.time_limit,
-            "skills": [{"activation": kind_of(s.activation), "target": kind_of(s.target)} for s in self.skills]})
+        write_chain(Path(folder), {
+            "environment": self.environment.to_dict(), "time_limit": self.time_limit,
+            "skills": [{"activation": kind_of(s.activation), "target": kind_of(s.target)} for s in self.skills],
+        }, arrays, [skill.policy for skill in self.skills])
 
     @classmethod
     def load(cls, folder: str | Path, *, trust: bool = False) -> "SkillChain":
@@ -152,13 +146,7 @@ class SkillChain:
             DamagedFile: a file is missing, truncated, or of another version.
         """
         folder = Path(folder)
-        structure = read_json(folder / "chain.json")
-        if not isinstance(structure, dict) or structure.get("format") != FORMAT:
-            raise DamagedFile(f"{folder / 'chain.json'} is not a skill chain")
-        if structure["version"] != VERSION:
-            raise DamagedFile(f"{folder / 'chain.json'} has version {structure['version']}, expected {VERSION}")
-        arrays = read_arrays(folder / "chain.npz")
-        policies = load_policies(folder / "chain.safetensors", len(structure["skills"]))
+        structure, arrays, policies = read_chain(folder, trust=trust)
         try:
             skills = tuple(
                 Skill(policy, from_arrays(entry["activation"], arrays, f"activation{index}"),
@@ -166,7 +154,7 @@ class SkillChain:
                 for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
             environment = EnvSpec.from_dict(structure["environment"], trusted=trust)
             return cls(skills, arrays["start"], environment, structure["time_limit"])
-        except (KeyError, ValueError) as error:
+        except (KeyError, ValueError, TypeError, IndexError) as error:
             raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error
 
 
