@@ -17,7 +17,8 @@ from pbcs_ompl.core.errors import CallbackFailed, Mismatch, PbcsError
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Array, Counter, ProgressCallback
-from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, read_json, read_toml, write_json
+from pbcs_ompl.results.checksums import write_summed_json
+from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, read_json, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.results.provenance import planning_versions
 from pbcs_ompl.results.schema import PlanEffort
@@ -140,7 +141,7 @@ class Training:
                 raise Mismatch("the trajectory does not end in the environment's goal")
         if self.path and trajectory is not None:
             trajectory.save(self.path / TRAJECTORY)
-            write_json(self.path / PLAN, {"transitions": transitions})
+            write_summed_json(self.path / PLAN, {"transitions": transitions})
         return trajectory, transitions
 
     def _check_replays(self, trajectory: Trajectory) -> None:
