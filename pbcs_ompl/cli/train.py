@@ -86,8 +86,10 @@ def _closing_lines(result: TrainResult, out: Path) -> list[tuple[str, str]]:
         lines.append(("rollout", f"{format_number(result.nominal.steps_median)} steps to the goal without noise"))
     if result.robust is not None:
         rate = format_rate(result.robust.success_rate, result.robust.wilson)
-        lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions"))
+        lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions, in fresh environments"))
     lines.append(("files", list_files(out)))
+    if result.complete and result.chain is None:
+        return lines
     if result.complete:
         return [*lines, ("next", command(eval_words(out, epsilon=0.2)))]
     return [*lines, ("next", f"{command(resume_words(out))} --max-transitions N, with a larger N")]

@@ -13,7 +13,7 @@ from pbcs_ompl.results.files import read_arrays, write_arrays
 from pbcs_ompl.skills.chain import Skill
 from pbcs_ompl.skills.trainer import SkillTrainer
 
-VERSION = 3
+VERSION = 4
 
 
 @dataclass(frozen=True)
