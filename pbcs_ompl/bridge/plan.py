@@ -13,16 +13,16 @@ from ompl import base as ob
 from pbcs_ompl.bridge.coverage import Coverage, TransitionRecorder
 from pbcs_ompl.bridge.planner_spec import PlannerSpec, as_batch_planner
 from pbcs_ompl.bridge.problem import CallbackState, Problem, make_problem
-from pbcs_ompl.bridge.termination import Limits, checked_limits, interruptible, make_stop
+from pbcs_ompl.bridge.termination import Limits, checked_limits, make_stop
 from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory
 from pbcs_ompl.bridge.tree import save_tree, tree_of
 from pbcs_ompl.bridge.verification import Verification, verify
-from pbcs_ompl.core.callbacks import callback_failed
+from pbcs_ompl.core.callbacks import code_of_others
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.interfaces import BatchPlanner, ResettableModel
 from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.signals import interruptible
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
@@ -153,29 +153,27 @@ class _Found(NamedTuple):
 def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
             on_progress: ProgressCallback | None) -> _Found:
     setup, callbacks = problem.setup, problem.callbacks
-    planner = spec.build(problem.space_information, SeedTree(seed).child("planner").integer())
-    batch_planner = as_batch_planner(planner)
-    if batch_planner is not None:
-        batch_planner.use_model(problem.model, callbacks.counter)
-    setup.setPlanner(planner)
-    setup.setup()
+    with code_of_others(f"the planner {spec.name!r}"):
+        planner = spec.build(problem.space_information, SeedTree(seed).child("planner").integer())
+        batch_planner = as_batch_planner(planner)
+        if batch_planner is not None:
+            batch_planner.use_model(problem.model, callbacks.counter)
+        setup.setPlanner(planner)
+        setup.setup()
     stop = make_stop(callbacks, limits.max_seconds, on_progress)
     if callbacks.recorder is not None:
         stop = callbacks.recorder.timed(stop, callbacks.counter)
-    with interruptible(lambda: callbacks.fail(KeyboardInterrupt())):
+    with interruptible(callbacks.fail):
         began = time.perf_counter()
-        try:
+        with code_of_others():
             planner.solve(ob.PlannerTerminationCondition(stop))
-        except PbcsError:
-            raise
-        except Exception as error:
-            raise callback_failed(error) from error
         seconds = time.perf_counter() - began
     if batch_planner is not None:
         _keep_error(batch_planner, callbacks)
     callbacks.raise_error()
-    tree = tree_of(planner, problem.space_information)
-    return _Found(_solution(problem, spec, seed), tree, spec.settings(planner), seconds)
+    with code_of_others(f"the planner {spec.name!r}"):
+        tree = tree_of(planner, problem.space_information)
+        return _Found(_solution(problem, spec, seed), tree, spec.settings(planner), seconds)
 
 
 def _keep_error(planner: BatchPlanner, callbacks: CallbackState) -> None:

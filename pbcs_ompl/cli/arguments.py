@@ -21,7 +21,8 @@ examples:
   pbcs compare --planners Ex RRTNH EST KPIECE1 --env pbcs/Maze-v0 --env-kwargs '{"size": 9}' --seeds 10
   pbcs report runs
 
-exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed
+exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed, 4 a mistake in pbcs,
+128+n stopped by signal n; after SIGTERM and SIGHUP as after Ctrl-C, a training can be resumed
 """
 ON_A_CLUSTER = """\
 on a cluster:

@@ -1,9 +1,6 @@
 """One training: plan, train skills along the plan, evaluate; it can be stopped and resumed after every step."""
 
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -11,11 +8,12 @@ from typing import Any
 
 from pbcs_ompl.agents.update import one_thread
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.bridge.termination import interruptible
 from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.core.errors import CallbackFailed, Mismatch, PbcsError
+from pbcs_ompl.core.callbacks import code_of_others
+from pbcs_ompl.core.errors import Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.signals import interruptible
 from pbcs_ompl.core.types import Array, Counter, ProgressCallback
 from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, read_json, read_toml, write_json
 from pbcs_ompl.results.folder import RunFolder
@@ -151,7 +149,7 @@ class Training:
         trajectory.check_belongs_to(self.model)
         if not trajectory.length:
             raise Mismatch("the trajectory has no steps: the start is in the goal, so there is nothing to train")
-        with _named_failures("replaying the trajectory"):
+        with code_of_others("the environment, while the trajectory was replayed,"):
             same = trajectory.replays_exactly(self.model)
         if not same:
             raise Mismatch("the trajectory does not replay in this environment: its actions lead to other states")
@@ -178,20 +176,20 @@ class Training:
 
     def _train(self, method: TrainingMethod) -> str | None:
         """Step until the method is done; return why it ended early, or None."""
-        stop = threading.Event()
-        with interruptible(stop.set):
+        stops: list[KeyboardInterrupt] = []
+        with interruptible(stops.append):
             while not method.done:
                 if method.trainer.counter.left <= 0:
                     self._checkpoint(method)
                     return (f"the budget of {self.config.max_transitions} transitions is used up, with "
                             f"{method.covered:.0%} of the plan covered")
-                with _named_failures("training"):
+                with code_of_others("the environment or the agent"):
                     method.step()
                 self._report(method)
-                if stop.is_set() or time.perf_counter() - self.last_checkpoint > CHECKPOINT_SECONDS:
+                if stops or time.perf_counter() - self.last_checkpoint > CHECKPOINT_SECONDS:
                     self._checkpoint(method)
-                if stop.is_set():
-                    raise KeyboardInterrupt
+                if stops:
+                    raise stops[0]
         return None
 
     def _checkpoint(self, method: TrainingMethod) -> None:
@@ -238,23 +236,13 @@ class Training:
             return
         trainer = method.trainer
         try:
-            self.on_progress({"phase": "train", "transitions": trainer.counter.count, "updates": trainer.updates,
-                              "covered": method.covered, "skills": len(method.skills),
-                              "seconds": time.perf_counter() - self.began})
+            with code_of_others("on_progress"):
+                self.on_progress({"phase": "train", "transitions": trainer.counter.count, "updates": trainer.updates,
+                                  "covered": method.covered, "skills": len(method.skills),
+                                  "seconds": time.perf_counter() - self.began})
         except KeyboardInterrupt:  # a caller may end a training from here
             self._checkpoint(method)
             raise
-
-
-@contextmanager
-def _named_failures(doing: str) -> Iterator[None]:
-    """Turn an exception of the environment or of the agent into a CallbackFailed."""
-    try:
-        yield
-    except PbcsError:
-        raise
-    except Exception as error:
-        raise CallbackFailed(f"the environment or the agent raised while {doing}: {error!r}") from error
 
 
 def training_versions() -> dict[str, str]:
