@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.core.plain import plain
+from pbcs_ompl.core.utf8 import utf8
 
 CONFIG, RESULT, PROVENANCE = "config.toml", "result.json", "provenance.json"
 """Every folder: the settings that repeat the run, what it found, with which versions and machines."""
@@ -61,7 +62,8 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file atomically."""
-    write_atomically(path, lambda file: file.write(text.encode()))
+    content = utf8(text)
+    write_atomically(path, lambda file: file.write(content))
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -85,7 +87,7 @@ def read_json(path: Path) -> Any:
     Raises:
         DamagedFile: the file is missing, truncated or not JSON.
     """
-    return _read(path, lambda: json.loads(path.read_text()), OSError, ValueError)
+    return _read(path, lambda: json.loads(path.read_text("utf-8")), OSError, ValueError)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -94,7 +96,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         DamagedFile: the file is missing or does not parse.
     """
-    return _read(path, lambda: tomllib.loads(path.read_text()), OSError, ValueError)
+    return _read(path, lambda: tomllib.loads(path.read_text("utf-8")), OSError, ValueError)
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
