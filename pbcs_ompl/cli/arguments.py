@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
+from pbcs_ompl.cli.streams import print_output
 from pbcs_ompl.cli.values import choice, fraction, integer, json_object, part, seconds
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
@@ -47,6 +48,9 @@ class Parser(argparse.ArgumentParser):
         self.options += [name for name in names if name.startswith("-")]
         return super().add_argument(*names, **settings)
 
+    def print_help(self, file: Any = None) -> None:
+        print_output(self.format_help().rstrip())
+
     def error(self, message: str) -> NoReturn:
         raise InvalidOption(f"{message} (see {self.prog} --help)")
 
@@ -57,7 +61,7 @@ class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
         from pbcs_ompl import __version__
 
-        print(f"pbcs {__version__}")
+        print_output(f"pbcs {__version__}")
         parser.exit()
 
 

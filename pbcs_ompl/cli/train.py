@@ -10,6 +10,7 @@ from pbcs_ompl.cli.pictures import draw_chain
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary, warn
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import format_duration, format_number, format_rate
+from pbcs_ompl.core.signals import with_remedy
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words, resume_words
 from pbcs_ompl.results.files import CONFIG, TRAJECTORY
@@ -27,9 +28,9 @@ def run(arguments: Namespace) -> int:
         out = Path(arguments.out or fresh_folder("train", arguments.env, arguments.method, arguments.seed))
     try:
         result = _train(arguments, out)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         if (out / CONFIG).is_file():
-            raise KeyboardInterrupt(f"continue with: {command(resume_words(out))}") from None
+            raise with_remedy(error, f"continue with: {command(resume_words(out))}") from None
         raise
     if result.reason is not None:
         warn(result.reason)
