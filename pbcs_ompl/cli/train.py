@@ -2,9 +2,11 @@
 
 from argparse import Namespace
 from pathlib import Path
+from typing import Any
 
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.cli.arguments import build_parser, environment
+from pbcs_ompl.cli.finished import lacks_picture_only
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_chain
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary, warn
@@ -13,8 +15,9 @@ from pbcs_ompl.core.formatting import format_duration, format_number, format_rat
 from pbcs_ompl.core.signals import with_remedy
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words, resume_words
-from pbcs_ompl.results.files import CONFIG, TRAJECTORY
-from pbcs_ompl.skills import TrainResult, resume, train
+from pbcs_ompl.results.files import CHAIN, CONFIG, TRAJECTORY
+from pbcs_ompl.results.folder import RunFolder, read_folder
+from pbcs_ompl.skills import SkillChain, TrainResult, resume, train
 
 
 def run(arguments: Namespace) -> int:
@@ -22,6 +25,8 @@ def run(arguments: Namespace) -> int:
     if arguments.resume:
         _refuse_other_options(arguments)
         out = Path(arguments.resume)
+        if lacks_picture_only(out):
+            return _draw_only(out, as_json=arguments.json)
     else:
         if arguments.env is None:
             raise InvalidOption("--env is missing (see pbcs train --help)")
@@ -34,7 +39,7 @@ def run(arguments: Namespace) -> int:
         raise
     if result.reason is not None:
         warn(result.reason)
-    _draw(result, out)
+    _draw(result.summary(), result.chain, result.trajectory, out)
     print_summary(result.summary(), _closing_lines(result, out), as_json=arguments.json)
     return 0 if result.solved else 1
 
@@ -65,15 +70,26 @@ def _read_trajectory(path: Path) -> Trajectory:
     return Trajectory.load(path / TRAJECTORY if path.is_dir() else path)
 
 
-def _draw(result: TrainResult, out: Path) -> None:
-    if result.chain is None:
+def _draw_only(out: Path, *, as_json: bool) -> int:
+    """Make the picture of a training that was killed after its result."""
+    with RunFolder(out, resume=True):
+        result = read_folder(out).result or {}
+        chain = SkillChain.load(out / CHAIN) if (out / CHAIN).is_dir() else None
+        trajectory = Trajectory.load(out / TRAJECTORY) if (out / TRAJECTORY).exists() else None
+        _draw(result, chain, trajectory, out)
+    print_summary(result, [("solved" if result["solved"] else "not solved", "ended before; its picture is made now"),
+                           ("files", list_files(out))], as_json=as_json)
+    return 0 if result["solved"] else 1
+
+
+def _draw(result: dict[str, Any], chain: SkillChain | None, trajectory: Trajectory | None, out: Path) -> None:
+    if chain is None:
         return
-    model = make(result.chain.environment)
-    trajectory = None if result.trajectory is None else result.trajectory.states
-    rollout = result.chain.rollout(model) if result.complete else None
-    title = (f"{model.spec.id}: {len(result.chain.skills)} skills, "
-             f"{result.train_transitions:,} transitions, {result.updates:,} updates")
-    draw_chain(model, result.chain, trajectory, rollout, title, out)
+    model = make(chain.environment)
+    rollout = chain.rollout(model) if result["complete"] else None
+    title = (f"{model.spec.id}: {len(chain.skills)} skills, "
+             f"{result['train_transitions']:,} transitions, {result['updates']:,} updates")
+    draw_chain(model, chain, None if trajectory is None else trajectory.states, rollout, title, out)
 
 
 def _closing_lines(result: TrainResult, out: Path) -> list[tuple[str, str]]:

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -58,6 +59,17 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
+
+
+TEMPORARY = re.compile(r"\..+\.[0-9a-f]{8}")
+"""The names of the files that `write_atomically` renames at its end."""
+
+
+def sweep_temporaries(folder: Path) -> None:
+    """Remove what processes that were killed while they wrote have left in a folder and those below it."""
+    for place, _, names in os.walk(folder):
+        for name in filter(TEMPORARY.fullmatch, names):
+            (Path(place) / name).unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:
