@@ -12,14 +12,14 @@ from typing import Any, Literal, Protocol
 import gymnasium
 import numpy as np
 
-from pbcs_ompl.core.callbacks import callback_failed
+from pbcs_ompl.core.callbacks import code_of_others
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import NotVerified, PbcsError
+from pbcs_ompl.core.errors import NotVerified
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap
-from pbcs_ompl.resettable.fresh import EnvMaker
+from pbcs_ompl.resettable.fresh import EnvMaker, close
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rules import GoalRule, Outcome, goal_rule, granted_success
 
@@ -103,7 +103,7 @@ class Judge:
                     break
                 episode.step(action)
         finally:
-            episode.env.close()
+            close(episode.env)
         return episode.execution("end of the actions", observed=True)
 
     def drive(self, controller: Controller, *, reset_seeds: Sequence[int | None], max_steps: int,
@@ -134,7 +134,7 @@ class Judge:
                 results += _drive(controller, begun, noise, epsilon, max_steps)
         finally:
             for env in envs:
-                env.close()
+                close(env)
         return results
 
 
@@ -145,16 +145,12 @@ class _Episode:
         self.env, self._rule = env, rule
         self.ending: Ending | None = None
         self._rewards: list[float] = []
-        try:
+        with code_of_others("the environment"):
             observation, info = env.reset(seed=spec.reset_seed(reset_seed), options=spec.reset_options)
             outcome = Outcome(env.unwrapped, observation, math.nan, False, info)
             if rule(outcome):
                 self.ending = "goal"
-        except PbcsError:
-            raise
-        except Exception as error:
-            raise callback_failed(error, "the environment") from error
-        self._observations = [flat(observation)]
+            self._observations = [flat(observation)]
 
     @property
     def observation(self) -> Array:
@@ -163,15 +159,11 @@ class _Episode:
 
     def step(self, action: Any) -> None:
         """Make one step with a copy of an action."""
-        try:
+        with code_of_others("the environment"):
             observation, reward, terminated, truncated, info = self.env.step(np.array(action)[()])
             success = self._rule(Outcome(self.env.unwrapped, observation, float(reward), bool(terminated), info))
-        except PbcsError:
-            raise
-        except Exception as error:
-            raise callback_failed(error, "the environment") from error
-        self._rewards.append(float(reward))
-        self._observations.append(flat(observation))
+            self._rewards.append(float(reward))
+            self._observations.append(flat(observation))
         if success:
             self.ending = "goal"
         elif terminated or truncated:

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.core.plain import plain
+from pbcs_ompl.core.utf8 import utf8
 
 CONFIG, RESULT, PROVENANCE = "config.toml", "result.json", "provenance.json"
 """Every folder: the settings that repeat the run, what it found, with which versions and machines."""
@@ -59,9 +61,21 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
             raise
 
 
+TEMPORARY = re.compile(r"\..+\.[0-9a-f]{8}")
+"""The names of the files that `write_atomically` renames at its end."""
+
+
+def sweep_temporaries(folder: Path) -> None:
+    """Remove what processes that were killed while they wrote have left in a folder and those below it."""
+    for place, _, names in os.walk(folder):
+        for name in filter(TEMPORARY.fullmatch, names):
+            (Path(place) / name).unlink(missing_ok=True)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file atomically."""
-    write_atomically(path, lambda file: file.write(text.encode()))
+    content = utf8(text)
+    write_atomically(path, lambda file: file.write(content))
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -85,7 +99,7 @@ def read_json(path: Path) -> Any:
     Raises:
         DamagedFile: the file is missing, truncated or not JSON.
     """
-    return _read(path, lambda: json.loads(path.read_text()), OSError, ValueError)
+    return _read(path, lambda: json.loads(path.read_text("utf-8")), OSError, ValueError)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -94,7 +108,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         DamagedFile: the file is missing or does not parse.
     """
-    return _read(path, lambda: tomllib.loads(path.read_text()), OSError, ValueError)
+    return _read(path, lambda: tomllib.loads(path.read_text("utf-8")), OSError, ValueError)
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:

@@ -1,9 +1,6 @@
 """One training: plan, train skills along the plan, evaluate; it can be stopped and resumed after every step."""
 
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -14,12 +11,13 @@ import numpy as np
 
 from pbcs_ompl.agents.update import one_thread
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.bridge.termination import interruptible
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.bridge.verification import verify
-from pbcs_ompl.core.errors import BudgetUsedUp, CallbackFailed, Mismatch, NotVerified, PbcsError
+from pbcs_ompl.core.callbacks import code_of_others
+from pbcs_ompl.core.errors import BudgetUsedUp, Mismatch, NotVerified
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.signals import interruptible
 from pbcs_ompl.core.types import Array, Counter, ProgressCallback
 from pbcs_ompl.resettable.task import Task
 from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, read_json, read_toml, write_json
@@ -174,7 +172,7 @@ class Training:
             Mismatch: it belongs to another environment, leads elsewhere in this one, or does not reach the goal.
         """
         trajectory.check_belongs_to(self.model)
-        with _named_failures("replaying the trajectory"):
+        with code_of_others("the environment, while the trajectory was replayed,"):
             same = trajectory.replays_exactly(self.model)
         if not same:
             raise Mismatch("the trajectory does not replay in this environment: its actions lead to other states")
@@ -205,18 +203,18 @@ class Training:
 
     def _train(self, method: TrainingMethod) -> str | None:
         """Step until the method is done; return why it ended early, or None."""
-        stop = threading.Event()
-        with interruptible(stop.set):
+        stops: list[KeyboardInterrupt] = []
+        with interruptible(stops.append):
             while not method.done:
                 if not self._step(method):
                     self._checkpoint(method)
                     return (f"the budget of {self.config.max_transitions} transitions is used up, with "
                             f"{method.covered:.0%} of the plan covered")
                 self._report(method)
-                if stop.is_set() or time.perf_counter() > self.next_checkpoint:
+                if stops or time.perf_counter() > self.next_checkpoint:
                     self._checkpoint(method)
-                if stop.is_set():
-                    raise KeyboardInterrupt
+                if stops:
+                    raise stops[0]
         return None
 
     def _step(self, method: TrainingMethod) -> bool:
@@ -230,7 +228,7 @@ class Training:
         if counter.left < 2 * episodes.beta * episodes.max_steps or method.covered >= 1.0:
             before = deepcopy(method.snapshot())
         try:
-            with _named_failures("training"):
+            with code_of_others("the environment or the agent"):
                 if counter.left > 0:
                     method.step()
                     return True
@@ -301,23 +299,13 @@ class Training:
             return
         trainer = method.trainer
         try:
-            self.on_progress({"phase": "train", "transitions": trainer.counter.count, "updates": trainer.updates,
-                              "covered": method.covered, "skills": len(method.skills),
-                              "seconds": time.perf_counter() - self.began})
+            with code_of_others("on_progress"):
+                self.on_progress({"phase": "train", "transitions": trainer.counter.count, "updates": trainer.updates,
+                                  "covered": method.covered, "skills": len(method.skills),
+                                  "seconds": time.perf_counter() - self.began})
         except KeyboardInterrupt:  # a caller may end a training from here
             self._checkpoint(method)
             raise
-
-
-@contextmanager
-def _named_failures(doing: str) -> Iterator[None]:
-    """Turn an exception of the environment or of the agent into a CallbackFailed."""
-    try:
-        yield
-    except PbcsError:
-        raise
-    except Exception as error:
-        raise CallbackFailed(f"the environment or the agent raised while {doing}: {error!r}") from error
 
 
 def training_versions() -> dict[str, str]:

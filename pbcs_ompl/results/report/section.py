@@ -80,7 +80,7 @@ def make_section(path: Path, root: Path) -> Section:
                           f"{error!r}") from error
     pictures = [*path.glob("*.png"), *path.glob(f"{FIGURES}/*.png")]
     return Section(_name(path, root), folder.kind, content, [read_figure(picture) for picture in sorted(pictures)],
-                   (path / CONFIG).read_text(), _versions(folder.provenance), repeat, resume)
+                   (path / CONFIG).read_text("utf-8"), _versions(folder.provenance), repeat, resume)
 
 
 def damaged_section(path: Path, root: Path, error: DamagedFile) -> Section:
