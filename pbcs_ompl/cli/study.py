@@ -10,6 +10,7 @@ from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import format_value
+from pbcs_ompl.core.signals import with_remedy
 from pbcs_ompl.experiments.records import record_file
 from pbcs_ompl.experiments.run import Shard
 from pbcs_ompl.experiments.run_study import open_study, run_shard, run_study
@@ -41,8 +42,8 @@ def run(arguments: Namespace) -> int:
         return _emit(study, arguments, out)
     try:
         return _make(study, arguments, out)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"continue with the same command and --out {shell(str(out))}") from None
+    except KeyboardInterrupt as error:
+        raise with_remedy(error, f"continue with the same command and --out {shell(str(out))}") from None
 
 
 def _make(study: Study, arguments: Namespace, out: Path) -> int:

@@ -2,19 +2,23 @@
 
 from argparse import Namespace
 from pathlib import Path
+from typing import Any
 
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.cli.arguments import build_parser, environment
+from pbcs_ompl.cli.finished import lacks_picture_only
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_chain
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary, warn
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import format_duration, format_number, format_rate
+from pbcs_ompl.core.signals import with_remedy
 from pbcs_ompl.core.trust import module_names
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words, resume_words
-from pbcs_ompl.results.files import CONFIG, TRAJECTORY
-from pbcs_ompl.skills import TrainResult, resume, train
+from pbcs_ompl.results.files import CHAIN, CONFIG, TRAJECTORY
+from pbcs_ompl.results.folder import RunFolder, read_folder
+from pbcs_ompl.skills import SkillChain, TrainResult, resume, train
 
 
 def run(arguments: Namespace) -> int:
@@ -22,20 +26,22 @@ def run(arguments: Namespace) -> int:
     if arguments.resume:
         _refuse_other_options(arguments)
         out = Path(arguments.resume)
+        if lacks_picture_only(out):
+            return _draw_only(out, trust=arguments.trust, as_json=arguments.json)
     else:
         if arguments.env is None:
             raise InvalidOption("--env is missing (see pbcs train --help)")
         out = Path(arguments.out or fresh_folder("train", arguments.env, arguments.method, arguments.seed))
     try:
         result = _train(arguments, out)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         if (out / CONFIG).is_file():
             again = command(resume_words(out, trust=_names_modules(arguments)))
-            raise KeyboardInterrupt(f"continue with: {again}") from None
+            raise with_remedy(error, f"continue with: {again}") from None
         raise
     if result.reason is not None:
         warn(result.reason)
-    _draw(result, out)
+    _draw(result.summary(), result.chain, result.trajectory, out)
     print_summary(result.summary(), _closing_lines(arguments, result, out), as_json=arguments.json)
     return 0 if result.solved else 1
 
@@ -66,15 +72,26 @@ def _read_trajectory(path: Path) -> Trajectory:
     return Trajectory.load(path / TRAJECTORY if path.is_dir() else path)
 
 
-def _draw(result: TrainResult, out: Path) -> None:
-    if result.chain is None:
+def _draw_only(out: Path, *, trust: bool, as_json: bool) -> int:
+    """Make the picture of a training that was killed after its result."""
+    with RunFolder(out, resume=True):
+        result = read_folder(out).result or {}
+        chain = SkillChain.load(out / CHAIN, trust=trust) if (out / CHAIN).is_dir() else None
+        trajectory = Trajectory.load(out / TRAJECTORY) if (out / TRAJECTORY).exists() else None
+        _draw(result, chain, trajectory, out)
+    print_summary(result, [("solved" if result["solved"] else "not solved", "ended before; its picture is made now"),
+                           ("files", list_files(out))], as_json=as_json)
+    return 0 if result["solved"] else 1
+
+
+def _draw(result: dict[str, Any], chain: SkillChain | None, trajectory: Trajectory | None, out: Path) -> None:
+    if chain is None:
         return
-    model = make(result.chain.environment)
-    trajectory = None if result.trajectory is None else result.trajectory.states
-    rollout = result.chain.rollout(model) if result.complete else None
-    title = (f"{model.spec.id}: {len(result.chain.skills)} skills, "
-             f"{result.train_transitions:,} transitions, {result.updates:,} updates")
-    draw_chain(model, result.chain, trajectory, rollout, title, out)
+    model = make(chain.environment)
+    rollout = chain.rollout(model) if result["complete"] else None
+    title = (f"{model.spec.id}: {len(chain.skills)} skills, "
+             f"{result['train_transitions']:,} transitions, {result['updates']:,} updates")
+    draw_chain(model, chain, None if trajectory is None else trajectory.states, rollout, title, out)
 
 
 def _names_modules(arguments: Namespace) -> bool:
@@ -93,8 +110,10 @@ def _closing_lines(arguments: Namespace, result: TrainResult, out: Path) -> list
         lines.append(("rollout", f"{format_number(result.nominal.steps_median)} steps to the goal without noise"))
     if result.robust is not None:
         rate = format_rate(result.robust.success_rate, result.robust.wilson)
-        lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions"))
+        lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions, in fresh environments"))
     lines.append(("files", list_files(out)))
+    if result.complete and result.chain is None:
+        return lines
     trust = _names_modules(arguments)
     if result.complete:
         return [*lines, ("next", command(eval_words(out, epsilon=0.2, trust=trust)))]

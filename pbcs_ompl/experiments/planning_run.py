@@ -91,13 +91,13 @@ def _warm_up(settings: dict[str, Any]) -> None:
 def _reset_peak_of_memory() -> None:
     """Have Linux measure the peak of this process's memory from now on."""
     with suppress(OSError):  # another system
-        Path("/proc/self/clear_refs").write_text("5")
+        Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
 
 
 def _peak_megabytes() -> float | None:
     """Return the most memory this process has had, in MB of 10^6 bytes; None where the system is not Linux."""
     try:
-        status = Path("/proc/self/status").read_text()
+        status = Path("/proc/self/status").read_text(encoding="utf-8")
     except OSError:
         return None
     peak = re.search(r"VmHWM:\s*(\d+) kB", status)

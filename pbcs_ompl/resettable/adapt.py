@@ -82,7 +82,7 @@ def _choose(inner: Any, goal: Any, feature: Any) -> ResettableModel:
     if isinstance(inner, GetSetEnv) and not (is_mujoco_env(inner) and not _is_vector(inner)):
         check_observations(cast(gymnasium.Env[Any, Any], inner))
         return _model_of(VectorEnv(inner, goal, feature)) if ruled else _get_set(inner)
-    check_flattenable(inner)
+    check_flattenable(cast(gymnasium.Env[Any, Any], inner))
     return _model_of(_restorable(inner, goal, feature))
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.core.utf8 import utf8
 from pbcs_ompl.results.files import (
     CONFIG,
     PLAN,
@@ -73,7 +74,7 @@ def write_summed_toml(path: Path, table: dict[str, Any]) -> None:
 
 
 def _write(path: Path, text: str) -> None:
-    line = f"\n{_sum(text.encode())}  {path.name}\n"  # a line of a killed process may have no end
+    line = f"\n{_sum(utf8(text))}  {path.name}\n"  # a line of a killed process may have no end
     with write_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         handle = os.open(path.parent / SUMS, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o666)

@@ -95,7 +95,7 @@ def compare_words(config: dict[str, Any]) -> Words:
         environments = environment_words(specs[0])
     else:
         environments = ["--env", *(spec.id for spec in specs), "--env-kwargs",
-                        *(json.dumps(spec.kwargs, default=plain) for spec in specs), *_rule_words(specs[0])]
+                        *(_json(spec.kwargs) for spec in specs), *_rule_words(specs[0])]
     return ["compare", "--planners", *config["planners"], *_json_words("--planner-kwargs", options), *environments,
             "--seeds", str(len(config["seeds"])), *_budgets(config)]
 
@@ -131,7 +131,11 @@ def _rule_words(spec: EnvSpec) -> Words:
 
 def _json_words(option: str, values: dict[str, Any]) -> Words:
     """Return an option whose value is a JSON object; nothing where that is empty."""
-    return [option, json.dumps(values, default=plain)] if values else []
+    return [option, _json(values)] if values else []
+
+
+def _json(values: dict[str, Any]) -> str:
+    return json.dumps(values, default=plain, ensure_ascii=False)
 
 
 def _budgets(config: dict[str, Any]) -> Words:

@@ -4,6 +4,7 @@ import errno
 import io
 import json
 import os
+import re
 import stat
 import zipfile
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.text_values import parse_json, parse_toml
+from pbcs_ompl.core.utf8 import utf8
 from pbcs_ompl.results.schema import check
 
 CONFIG, RESULT, PROVENANCE = "config.toml", "result.json", "provenance.json"
@@ -65,9 +67,21 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
             raise
 
 
+TEMPORARY = re.compile(r"\..+\.[0-9a-f]{8}")
+"""The names of the files that `write_atomically` renames at its end."""
+
+
+def sweep_temporaries(folder: Path) -> None:
+    """Remove what processes that were killed while they wrote have left in a folder and those below it."""
+    for place, _, names in os.walk(folder):
+        for name in filter(TEMPORARY.fullmatch, names):
+            (Path(place) / name).unlink(missing_ok=True)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file atomically."""
-    write_atomically(path, lambda file: file.write(text.encode()))
+    content = utf8(text)
+    write_atomically(path, lambda file: file.write(content))
 
 
 def write_json(path: Path, value: Any) -> None:

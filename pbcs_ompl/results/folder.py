@@ -18,6 +18,7 @@ from pbcs_ompl.results.files import (
     RESULT,
     read_json,
     read_toml,
+    sweep_temporaries,
     to_toml,
     write_errors,
 )
@@ -43,16 +44,21 @@ class RunFolder:
 
     def __init__(self, path: str | Path, *, resume: bool = False, shard: str = ""):
         self.path = Path(path)
+        with write_errors(self.path):
+            self._check(resume)
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._locks = _locked(self.path, shard)
+            if not shard:  # other shards may be writing
+                sweep_temporaries(self.path)
+        if resume:
+            self._note_provenance()
+
+    def _check(self, resume: bool) -> None:
         if resume and not (self.path / CONFIG).is_file():
             raise RunFolderError(f"nothing to resume: {self.path / CONFIG} does not exist")
         leftovers = (LOCK, SUMS, f".{CONFIG}.")  # of a process that was killed before it wrote its settings
         if not resume and self.path.is_dir() and any(not p.name.startswith(leftovers) for p in self.path.iterdir()):
             raise RunFolderError(f"{self.path} already exists; choose another --out, or remove it first")
-        with write_errors(self.path):
-            self.path.mkdir(parents=True, exist_ok=True)
-            self._locks = _locked(self.path, shard)
-        if resume:
-            self._note_provenance()
 
     def __enter__(self) -> "RunFolder":
         return self
@@ -95,6 +101,39 @@ def _locked(path: Path, shard: str) -> ExitStack:
         return locks.pop_all()
 
 
+def start_run(path: Path, config: dict[str, Any], *, may_change: tuple[str, ...], parts: tuple[str, ...]) -> RunFolder:
+    """Open a new folder, or the one in which a run with the same settings was killed before it had a result.
+
+    Args:
+        path: The folder.
+        config: The settings; see `RunFolder.write_config`.
+        may_change: Settings that do not tell two runs apart.
+        parts: The files of such a run, which are removed: it is made again.
+
+    Raises:
+        RunFolderError: the folder holds something else, is in use, or cannot be written.
+    """
+    killed = _was_killed(path, config, may_change)
+    opened = RunFolder(path, resume=killed)
+    for part in parts if killed else ():
+        (path / part).unlink(missing_ok=True)
+    opened.write_config(config)
+    return opened
+
+
+def _was_killed(path: Path, config: dict[str, Any], may_change: tuple[str, ...]) -> bool:
+    with write_errors(path):
+        if not (path / CONFIG).is_file() or (path / RESULT).exists():
+            return False
+    return not set(_different(path, config)) - set(may_change)
+
+
+def _different(path: Path, config: dict[str, Any]) -> list[str]:
+    """Return the settings that are not those in a folder."""
+    before, now = read_toml(path / CONFIG), tomllib.loads(to_toml(config))
+    return sorted(key for key in before.keys() | now.keys() if before.get(key) != now.get(key))
+
+
 def open_run(path: Path, config: dict[str, Any], *, may_change: tuple[str, ...] = (), shard: str = "") -> RunFolder:
     """Open a new folder for a run with these settings, or resume in the one where the same run was stopped.
 
@@ -118,8 +157,7 @@ def _open_run(path: Path, config: dict[str, Any], may_change: tuple[str, ...], s
         opened = RunFolder(path, shard=shard)
         opened.write_config(config)
         return opened
-    before, now = read_toml(path / CONFIG), tomllib.loads(to_toml(config))
-    different = sorted(key for key in before.keys() | now.keys() if before.get(key) != now.get(key))
+    different = _different(path, config)
     forbidden = [key for key in different if key not in may_change]
     if forbidden:
         raise RunFolderError(f"{path} holds another run ({', '.join(forbidden)}); choose another --out")

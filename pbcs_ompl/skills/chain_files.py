@@ -18,7 +18,7 @@ from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.results.arrays import NUMBERS, take
 from pbcs_ompl.results.files import read_arrays, read_bytes, read_json, write_arrays, write_json
-from pbcs_ompl.results.schema import Positive, check
+from pbcs_ompl.results.schema import Count, Positive, check
 from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
 
 STRUCTURE, SETS, POLICIES = "chain.json", "chain.npz", "chain.safetensors"
@@ -31,6 +31,7 @@ class SkillWords(TypedDict):
 
     activation: str
     target: str
+    entry: list[str]
 
 
 class ChainWords(TypedDict):
@@ -38,6 +39,8 @@ class ChainWords(TypedDict):
 
     environment: EnvValues
     time_limit: Positive
+    reset_seed: Count | None
+    action_shape: list[Count]
     skills: list[SkillWords]
     sha256: dict[str, str]
 

@@ -15,7 +15,7 @@ from pbcs_ompl.results.schema import CheckpointVersion, CheckpointWords
 from pbcs_ompl.skills.chain import Skill
 from pbcs_ompl.skills.trainer import SkillTrainer
 
-VERSION = 3
+VERSION = 4
 WORDS = "__plain__"
 """The array with the plain values, as JSON."""
 

@@ -29,7 +29,8 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
           agent_settings: dict[str, Any] | None = None, planner: str | None = None,
           planner_kwargs: dict[str, Any] | None = None, env_kwargs: dict[str, Any] | None = None,
           goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
-          seed: int = 0, max_transitions: int = 10_000_000, device: str = "cpu", out: str | Path | None = None,
+          reset_options: dict[str, Any] | None = None, max_episode_steps: int | None = None, seed: int = 0,
+          max_transitions: int = 10_000_000, device: str = "cpu", out: str | Path | None = None,
           on_progress: ProgressCallback | None = None) -> TrainResult:
     """Plan (unless a trajectory is given) and train skills along the plan.
 
@@ -45,9 +46,9 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         planner: A registered planner, or module:attribute; None for Ex, or where nothing is planned.
         planner_kwargs: Options of the planner.
         env_kwargs: Options of the environment, when `env` is an id.
-        goal, feature, start_seed: See `pbcs_ompl.make`.
+        goal, feature, start_seed, reset_options, max_episode_steps: See `pbcs_ompl.make`.
         seed: Root of all random streams; equal seeds give equal results.
-        max_transitions: Budget of environment steps, planning included.
+        max_transitions: Budget of environment steps, planning included; the executions of the judge do not count.
         device: Where the agent trains, "cpu" or "cuda".
         out: A new folder for config.toml, result.json, trajectory.npz, chain/ and, until the end, checkpoint.npz.
         on_progress: Called after every session and test with plain numbers.
@@ -67,7 +68,8 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         method=method, planner=planner, planner_kwargs=planner_kwargs, agent=agent, preset=preset, settings=settings,
         agent_settings=agent_settings, seed=seed, max_transitions=max_transitions, device=device,
         planned=trajectory is not None)
-    model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
+    model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options,
+                 max_episode_steps=max_episode_steps)
     if trajectory is not None:
         trajectory.check_belongs_to(model)
     if planner is not None or planner_kwargs:

@@ -195,7 +195,7 @@ def feature_bounds(env: Any, steps: int) -> tuple[Array, Array, str]:
     actions = ActionMap.of(env.action_space)
     features, is_observation = [env.get_env_state()[:size]], _same(env.get_env_state()[:size], first)
     for _ in range(steps):
-        action = actions.to_action(rng.uniform(actions.low, actions.high))
+        action = actions.draw(rng)
         observation, _, terminated, truncated, _ = env.step(action)
         features.append(env.get_env_state()[:size])
         is_observation = is_observation and _same(features[-1], observation)

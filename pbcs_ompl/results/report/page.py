@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pbcs_ompl.core.errors import DamagedFile, PbcsError, RunFolderError
 from pbcs_ompl.core.formatting import format_number, format_value
+from pbcs_ompl.core.utf8 import utf8
 from pbcs_ompl.results.files import write_atomically
 from pbcs_ompl.results.folder import find_folders
 from pbcs_ompl.results.report.section import DAMAGED, Section, damaged_section, make_section
@@ -62,7 +63,7 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Report:
     stream = templates.get_template("report.html").generate(
         sections=sections, texts=[text for _, text in shown], single=single, root=str(root), generator=GENERATOR,
         version=version("pbcs-ompl"), now=datetime.now().astimezone().isoformat(sep=" ", timespec="minutes"))
-    write_atomically(page, lambda file: file.writelines(part.encode(errors="backslashreplace") for part in stream))
+    write_atomically(page, lambda file: file.writelines(utf8(part) for part in stream))
     return Report(page, sections)
 
 
