@@ -19,7 +19,7 @@ from pbcs_ompl.skills.evaluation import evaluate
 def run(arguments: Namespace) -> int:
     """Evaluate and report. Returns 1 when no rollout reached the goal."""
     folder = Path(arguments.dir)
-    chain = SkillChain.load(folder / CHAIN if (folder / CHAIN).is_dir() else folder)
+    chain = SkillChain.load(folder / CHAIN if (folder / CHAIN).is_dir() else folder, trust=arguments.trust)
     if arguments.video:
         check_video(arguments.video)
     with nullcontext() if arguments.out is None else RunFolder(arguments.out) as out:
@@ -49,5 +49,5 @@ def _closing_lines(arguments: Namespace, summary: dict[str, Any]) -> list[tuple[
     if arguments.video:
         lines.append(("video", arguments.video))
     if not arguments.epsilon:
-        lines.append(("next", command(eval_words(arguments.dir, epsilon=0.1))))
+        lines.append(("next", command(eval_words(arguments.dir, epsilon=0.1, trust=arguments.trust))))
     return lines

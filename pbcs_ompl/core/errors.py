@@ -75,6 +75,10 @@ class DamagedFile(PbcsError):
     """A file that is truncated, of another version, or not ours."""
 
 
+class UntrustedModule(PbcsError):
+    """A file names a module that would be imported; files of others are data, until the user says otherwise."""
+
+
 class Mismatch(PbcsError):
     """Two things that do not belong together, such as a path and another environment."""
 

@@ -68,12 +68,14 @@ class Judge:
 
     Raises:
         NotVerified: it is not possible.
+        UntrustedModule: the goal was read from a file, and names a module.
     """
 
     def __init__(self, spec: EnvSpec, make_env: EnvMaker | None):
         if make_env is None:
             raise NotVerified(f"not verified: no fresh environment of {spec.id} can be made; register it with "
                               f"Gymnasium, or make it possible to copy it (copy.deepcopy)")
+        spec.check_trusted(known=[spec.id])  # making an environment checks its id
         self._spec, self._make_env = spec, make_env
         self._rule: GoalRule = granted_success if spec.goal is None else goal_rule(spec.goal)
 

@@ -10,16 +10,13 @@ from pbcs_ompl.core.errors import DamagedFile, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
 from pbcs_ompl.resettable.actions import ActionMap
-from pbcs_ompl.results.files import read_arrays, read_json, write_arrays, write_json
 from pbcs_ompl.skills.activation_sets import ActivationSet, Target, from_arrays, kind_of, to_arrays
+from pbcs_ompl.skills.chain_files import read_chain, write_chain
 from pbcs_ompl.skills.controller import ChainController
 from pbcs_ompl.skills.episodes import with_random_actions
 from pbcs_ompl.skills.observed_sets import Entry, entry_from_arrays, entry_kinds, entry_to_arrays
-from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
+from pbcs_ompl.skills.policy import SkillPolicy
 from pbcs_ompl.skills.waypoints import Waypoints
-
-FORMAT = "pbcs_ompl skill chain"
-VERSION = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,34 +156,31 @@ class SkillChain:
 
     def save(self, folder: str | Path) -> None:
         """Write chain.json (structure), chain.npz (activation sets and targets) and chain.safetensors (policies)."""
-        folder = Path(folder)
-        save_policies(folder / "chain.safetensors", [skill.policy for skill in self.skills])
         arrays = {"start": self.start, "first_action": self.actions.first, "last_action": self.actions.last}
         for index, skill in enumerate(self.skills):
             arrays |= to_arrays(skill.activation, f"activation{index}") | to_arrays(skill.target, f"target{index}")
             arrays |= entry_to_arrays(skill.entry, f"entry{index}")
-        write_arrays(folder / "chain.npz", **arrays)
-        write_json(folder / "chain.json", {
-            "format": FORMAT, "version": VERSION, "environment": self.environment.to_dict(),
-            "time_limit": self.time_limit, "reset_seed": self.reset_seed, "action_shape": list(self.actions.shape),
+        seed = {} if self.reset_seed is None else {"reset_seed": self.reset_seed}
+        write_chain(Path(folder), {
+            "environment": self.environment.to_dict(), "time_limit": self.time_limit, **seed,
+            "action_shape": list(self.actions.shape),
             "skills": [{"activation": kind_of(skill.activation), "target": kind_of(skill.target),
-                        "entry": entry_kinds(skill.entry)} for skill in self.skills]})
+                        "entry": entry_kinds(skill.entry)} for skill in self.skills],
+        }, arrays, [skill.policy for skill in self.skills])
 
     @classmethod
-    def load(cls, folder: str | Path) -> "SkillChain":
+    def load(cls, folder: str | Path, *, trust: bool = False) -> "SkillChain":
         """Read a chain that `save` wrote.
+
+        Args:
+            folder: The folder.
+            trust: Let its environment be made where that imports a module which the folder names.
 
         Raises:
             DamagedFile: a file is missing, truncated, or of another version.
         """
         folder = Path(folder)
-        structure = read_json(folder / "chain.json")
-        if not isinstance(structure, dict) or structure.get("format") != FORMAT:
-            raise DamagedFile(f"{folder / 'chain.json'} is not a skill chain")
-        if structure["version"] != VERSION:
-            raise DamagedFile(f"{folder / 'chain.json'} has version {structure['version']}, expected {VERSION}")
-        arrays = read_arrays(folder / "chain.npz")
-        policies = load_policies(folder / "chain.safetensors", len(structure["skills"]))
+        structure, arrays, policies = read_chain(folder, trust=trust)
         try:
             skills = tuple(
                 Skill(policy, from_arrays(entry["activation"], arrays, f"activation{index}"),
@@ -194,7 +188,8 @@ class SkillChain:
                       entry_from_arrays(entry["entry"], arrays, f"entry{index}"))
                 for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
             actions = ActionMap(arrays["first_action"], arrays["last_action"], tuple(structure["action_shape"]))
-            return cls(skills, arrays["start"], EnvSpec.from_dict(structure["environment"]), structure["time_limit"],
-                       actions, structure["reset_seed"])
-        except (KeyError, ValueError) as error:
+            environment = EnvSpec.from_dict(structure["environment"], trusted=trust)
+            return cls(skills, arrays["start"], environment, structure["time_limit"], actions,
+                       structure.get("reset_seed"))
+        except (KeyError, ValueError, TypeError, IndexError) as error:
             raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error

@@ -79,7 +79,7 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         return Training(model, config, folder, on_progress, False).run(trajectory)
 
 
-def resume(folder: str | Path, *, max_transitions: int | None = None,
+def resume(folder: str | Path, *, max_transitions: int | None = None, trust: bool = False,
            on_progress: ProgressCallback | None = None) -> TrainResult:
     """Continue an interrupted training; the result is that of an uninterrupted one, bit for bit.
 
@@ -89,16 +89,19 @@ def resume(folder: str | Path, *, max_transitions: int | None = None,
     Args:
         folder: The `out` of the training.
         max_transitions: A new budget, for a training that has used up its own.
+        trust: Import the modules that the folder names, such as an agent `module:Class`. Say so only of a folder whose
+            author you trust: they run.
         on_progress: Called after every session and test with plain numbers.
 
     Raises:
         RunFolderError: there is nothing to resume, or another process uses the folder.
         DamagedFile: a file in the folder is damaged.
+        UntrustedModule: the folder names a module, and is not trusted.
     """
     with RunFolder(folder, resume=True) as opened:
         if (opened.path / RESULT).is_file() and not (opened.path / CHECKPOINT).is_file():
             raise RunFolderError(f"the training in {opened.path} has ended; there is nothing to resume")
-        environment, config, versions = read_config(opened.path / CONFIG)
+        environment, config, versions = read_config(opened.path / CONFIG, trust=trust)
         _warn_of_other_versions(opened.path, versions)
         if max_transitions is not None:
             config = replace(config, max_transitions=max_transitions)

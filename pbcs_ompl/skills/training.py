@@ -23,6 +23,7 @@ from pbcs_ompl.resettable.task import Task
 from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, read_json, read_toml, write_json
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.results.provenance import planning_versions
+from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.config import METHODS, TrainConfig
 from pbcs_ompl.skills.evaluation import Evaluation, evaluate_chain
@@ -137,7 +138,7 @@ class Training:
         if self.path and self.resumed and (self.path / PLAN).is_file():
             trajectory = Trajectory.load(self.path / TRAJECTORY)
             self._check_replays(trajectory)
-            return trajectory, read_json(self.path / PLAN)["transitions"], None
+            return trajectory, read_json(self.path / PLAN, PlanEffort)["transitions"], None
         if self.config.planner is not None:
             return self._search()
         if trajectory is not None:
