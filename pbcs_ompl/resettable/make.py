@@ -60,13 +60,13 @@ def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[
     if isinstance(env, EnvSpec):
         return _make(replace(env, **given), env.goal if goal is None else goal,  # type: ignore[arg-type]
                      env.feature if feature is None else feature)
-    return _with_rules(adapt(env, goal=goal, feature=feature), given)
+    return _with_rules(adapt(env, goal=goal, feature=feature, reset_options=reset_options), given)
 
 
 def _make(spec: EnvSpec, goal: str | GoalRule | None, feature: str | FeatureRule | None) -> ResettableModel:
     load_environments()
     prefer_headless_rendering()
-    model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature)
+    model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature, reset_options=spec.reset_options)
     model.spec = replace(model.spec, id=spec.id, start_seed=spec.start_seed, reset_options=spec.reset_options,
                          max_episode_steps=spec.max_episode_steps)  # the id with its module, if it names one
     model.make_env = partial(fresh_env, spec)

@@ -21,6 +21,7 @@ from pbcs_ompl.resettable.rules import (
     reported_success,
     rule_text,
 )
+from pbcs_ompl.resettable.task_env import TaskEnv
 
 UNBOUNDED = 1e9
 """OMPL wants finite bounds. Dimensions that are not sampled get these."""
@@ -80,7 +81,11 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
 
     @abstractmethod
     def observation(self) -> Any:
-        """Return the observation in the present state."""
+        """Return what the environment within the wrappers observes in the present state."""
+
+    def seen(self, observation: Any) -> Any:
+        """Return what the wrappers make of what `observation` returned."""
+        return self.inner.seen(observation) if isinstance(self.inner, TaskEnv) else observation
 
     def default_feature(self) -> FeatureRule:
         """Return what planners explore unless the user says otherwise."""
@@ -129,7 +134,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         rows = np.empty((len(states), *self.observation_space.shape))  # type: ignore[misc]
         for row, state in zip(rows, states, strict=True):
             self.set_env_state(state)
-            row[:] = flat(self.observation())
+            row[:] = flat(self.seen(self.observation()))
         return rows
 
     def goal_distance(self, states: Array) -> Array:
@@ -161,11 +166,13 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
 
     def _store(self, outcome: Outcome) -> bool:
         """Keep feature and distance of what was reached; return whether it is a success."""
-        self._head = np.asarray(self._feature_of(outcome), dtype=np.float64).reshape(-1)
+        named = self.inner.kept.last if isinstance(self.inner, TaskEnv) else outcome.observation
+        self._head = np.asarray(self._feature_of(outcome._replace(named=named)), dtype=np.float64).reshape(-1)
         if not len(self._head):
             raise CallbackFailed("the feature function returned no numbers")
         success = bool(self._is_success(outcome))
-        reported = None if self.goal_rule is not None else self.reported_goal_distance(outcome)
+        seen = outcome._replace(observation=named)
+        reported = None if self.goal_rule is not None else self.reported_goal_distance(seen)
         self._has_goal_distance = reported is not None
         if reported is None:
             self._distance = 0.0 if success else 1.0
