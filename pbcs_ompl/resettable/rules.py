@@ -1,6 +1,6 @@
 """Goals and features of an environment that was not made for planning, in one line of text or as functions."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -103,7 +103,7 @@ def feature_rule(rule: str) -> FeatureRule:
     return lambda outcome: np.concatenate([_read("feature", rule, values, outcome) for values in chosen])
 
 
-def observed_dims(rule: str, size: int) -> list[int] | None:
+def observed_dims(rule: str, size: int) -> Sequence[int] | None:
     """Return which numbers of an observation of `size` a feature rule selects, in order; None if it reads others."""
     if _is_function(rule):
         return None
