@@ -53,6 +53,10 @@ class VisitedEnv(RestorableEnv):
         """Return the observation that was made when the present state was visited."""
         return self._observations[self._name]
 
+    def seen(self, observation: Any) -> Any:
+        """Return an observation as it is: the wrappers saw it when it was made."""
+        return observation
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         """Reset with a seed, a random one if need be, so that the start can be found again."""
         seed = int(np.random.default_rng().integers(2**32)) if seed is None else seed
