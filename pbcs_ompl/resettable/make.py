@@ -66,10 +66,10 @@ def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[
 def _make(spec: EnvSpec, goal: str | GoalRule | None, feature: str | FeatureRule | None) -> ResettableModel:
     load_environments()
     prefer_headless_rendering()
-    model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature)
+    make_env = partial(fresh_env, spec)
+    model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature, make_env=make_env)
     model.spec = replace(model.spec, id=spec.id, start_seed=spec.start_seed, reset_options=spec.reset_options,
                          max_episode_steps=spec.max_episode_steps)  # the id with its module, if it names one
-    model.make_env = partial(fresh_env, spec)
     return model
 
 

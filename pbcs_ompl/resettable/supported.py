@@ -3,6 +3,7 @@
 from typing import Any
 
 import gymnasium
+import numpy as np
 from gymnasium import spaces
 
 from pbcs_ompl.core.errors import NotResettable, UnsupportedSpace
@@ -15,6 +16,7 @@ def check_observations(env: gymnasium.Env) -> None:
         UnsupportedSpace: says the remedy.
     """
     observation = env.observation_space
+    _refuse_pixels(observation)
     if isinstance(observation, spaces.Dict | spaces.Tuple):
         raise UnsupportedSpace(f"observation space {type(observation).__name__}: expected a vector Box; "
                                f"flatten it inside the environment (gymnasium.spaces.flatten)")
@@ -30,8 +32,17 @@ def check_flattenable(env: gymnasium.Env) -> None:
     """
     observation = env.observation_space
     parts = observation.spaces.values() if isinstance(observation, spaces.Dict) else [observation]
+    for part in parts:
+        _refuse_pixels(part)
     if not all(isinstance(part, spaces.Box) for part in parts):
         raise UnsupportedSpace(f"observation space {observation}: expected a Box, or a Dict of Boxes")
+
+
+def _refuse_pixels(space: gymnasium.Space[Any]) -> None:
+    if isinstance(space, spaces.Box) and space.dtype == np.uint8 and len(space.shape) >= 2:
+        raise UnsupportedSpace(f"observation space {space.shape} of uint8: these are pixels, and the toolkit plans and "
+                               f"trains on numbers of its state; make the environment with vector observations (an "
+                               f"option such as obs_type='state' or 'ram'), or give it a wrapper-free `_get_obs` of them")
 
 
 TRANSPARENT = frozenset({

@@ -7,6 +7,7 @@ import numpy as np
 
 from pbcs_ompl.core.errors import NotResettable
 from pbcs_ompl.core.types import Array, BoolArray
+from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.sampling import uniform_in_ball
 
@@ -56,7 +57,7 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Make one step of the environment."""
-        observation, reward, terminated, truncated, info = self.inner.step(action)
+        observation, reward, terminated, truncated, info = self.inner.step(copied(action))
         self._success = float(bool(info.get("is_success", info.get("success", terminated))))
         return observation, float(reward), bool(terminated), bool(truncated), info
 
