@@ -48,8 +48,9 @@ class Evaluation:
 
 def evaluate(controller: SkillChain, env: str | EnvSpec | gymnasium.Env | ResettableModel | None = None, *,
              env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
-             feature: str | FeatureRule | None = None, start_seed: int | None = None, episodes: int = 100,
-             epsilon: float = 0.0, seed: int = 0) -> Evaluation:
+             feature: str | FeatureRule | None = None, start_seed: int | None = None,
+             reset_options: dict[str, Any] | None = None, episodes: int = 100, epsilon: float = 0.0,
+             seed: int = 0) -> Evaluation:
     """Execute a skill chain from the state it was trained to start from.
 
     In an environment that draws a new start or goal at each reset, that is one of many: a chain is a controller for
@@ -60,7 +61,7 @@ def evaluate(controller: SkillChain, env: str | EnvSpec | gymnasium.Env | Resett
         env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model; None for the environment that the
             chain was trained in.
         env_kwargs: Options of the environment, when `env` is an id.
-        goal, feature, start_seed: See `pbcs_ompl.make`.
+        goal, feature, start_seed, reset_options: See `pbcs_ompl.make`.
         episodes: Number of executions.
         epsilon: Fraction of actions that are replaced by random ones.
         seed: Of the random actions.
@@ -75,11 +76,11 @@ def evaluate(controller: SkillChain, env: str | EnvSpec | gymnasium.Env | Resett
                             "SkillChain.load(folder)")
     check_range("episodes", episodes, episodes >= 1, "at least 1")
     check_range("epsilon", epsilon, 0 <= epsilon <= 1, "within [0, 1]")
-    if env is None and (env_kwargs or goal is not None or feature is not None or start_seed is not None):
-        raise InvalidOption("env is None; expected an environment beside env_kwargs, goal, feature and start_seed, "
-                            "or none of them, for the environment that the chain was trained in")
+    if env is None and (env_kwargs or any(rule is not None for rule in (goal, feature, start_seed, reset_options))):
+        raise InvalidOption("env is None; expected an environment beside env_kwargs, goal, feature, start_seed and "
+                            "reset_options, or none of them, for the environment that the chain was trained in")
     model = make(controller.environment if env is None else env, env_kwargs, goal=goal, feature=feature,
-                 start_seed=start_seed)
+                 start_seed=start_seed, reset_options=reset_options)
     controller.check_belongs_to(model)
     starts = np.repeat(controller.start[None], episodes, axis=0)
     rollouts = controller.rollouts(model, starts, epsilon=epsilon, rng=SeedTree(seed).child("evaluation").generator())

@@ -28,7 +28,8 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
           agent_settings: dict[str, Any] | None = None, planner: str | None = None,
           planner_kwargs: dict[str, Any] | None = None, env_kwargs: dict[str, Any] | None = None,
           goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
-          seed: int = 0, max_transitions: int = 10_000_000, device: str = "cpu", out: str | Path | None = None,
+          reset_options: dict[str, Any] | None = None, seed: int = 0, max_transitions: int = 10_000_000,
+          device: str = "cpu", out: str | Path | None = None,
           on_progress: ProgressCallback | None = None) -> TrainResult:
     """Plan (unless a trajectory is given) and train skills along the plan.
 
@@ -44,7 +45,7 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         planner: A registered planner, or module:attribute; None for Ex, or where nothing is planned.
         planner_kwargs: Options of the planner.
         env_kwargs: Options of the environment, when `env` is an id.
-        goal, feature, start_seed: See `pbcs_ompl.make`.
+        goal, feature, start_seed, reset_options: See `pbcs_ompl.make`.
         seed: Root of all random streams; equal seeds give equal results.
         max_transitions: Budget of environment steps, planning included.
         device: Where the agent trains, "cpu" or "cuda".
@@ -66,7 +67,7 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         method=method, planner=planner, planner_kwargs=planner_kwargs, agent=agent, preset=preset, settings=settings,
         agent_settings=agent_settings, seed=seed, max_transitions=max_transitions, device=device,
         planned=trajectory is not None)
-    model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
+    model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options)
     if trajectory is not None:
         trajectory.check_belongs_to(model)
     if planner is not None or planner_kwargs:
