@@ -6,6 +6,7 @@ from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.errors import NotVerified, PbcsError
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.resettable.adapt import adapt_without_copy
+from pbcs_ompl.resettable.fresh import close
 from pbcs_ompl.resettable.judge import Execution, Judge
 from pbcs_ompl.resettable.model import Model
 
@@ -73,4 +74,4 @@ def _first_difference(trajectory: Trajectory, model: ResettableModel) -> int | N
         second.spec = model.spec
         return trajectory.first_difference(second)
     finally:
-        env.close()
+        close(env)

@@ -1,8 +1,8 @@
 """What a model can do and is asked to do, in words."""
 
-import sys
 from typing import Any
 
+from pbcs_ompl.cli.streams import print_error
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
@@ -35,7 +35,7 @@ def goal_words(model: ResettableModel) -> str:
 def note_rules(model: ResettableModel) -> None:
     """Print on stderr what is explored and what is a success where an adapter, not the environment, decides it."""
     if isinstance(model.env, RestorableEnv):
-        print(f"feature   {feature_words(model)}\ngoal      {goal_words(model)}", file=sys.stderr)
+        print_error(f"feature   {feature_words(model)}", f"goal      {goal_words(model)}")
 
 
 def _vector(values: Array) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from pbcs_ompl.core.callbacks import describe
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, PbcsError, UnknownName
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -97,12 +98,12 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
     except Exception as error:  # an author's mistake is a finding, not a crash
         if not isinstance(env, str | EnvSpec | gymnasium.Env):
             raise
-        found = str(error) if isinstance(error, PbcsError) else _describe(error)
+        found = str(error) if isinstance(error, PbcsError) else describe(error)
         return ResetReport(name, (Check("has an adapter", False, found),))
     try:
         trial = _Trial(model, seed)
     except Exception as error:  # as above
-        return ResetReport(model.spec.id, (Check("can be stepped", False, _describe(error)),))
+        return ResetReport(model.spec.id, (Check("can be stepped", False, describe(error)),))
     tests = [
         ("a restored state continues as before", trial.restored),
         ("the same after other steps and another reset", trial.disturbed),
@@ -122,12 +123,8 @@ def _run(name: str, test: Callable[[], str]) -> Check:
     try:
         found = test()
     except Exception as error:  # an author's mistake is a finding, not a crash
-        found = _describe(error)
+        found = describe(error)
     return Check(name, not found, found)
-
-
-def _describe(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
 
 
 class _Trial:

@@ -1,5 +1,6 @@
 """Fresh environments of a task: made by Gymnasium from its id, or copied from an object before anything ran in it."""
 
+import warnings
 from collections.abc import Callable
 from copy import deepcopy
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import gymnasium
 from gymnasium.wrappers import RepeatAction, TimeLimit
 
+from pbcs_ompl.core.callbacks import describe
 from pbcs_ompl.core.env_spec import EnvSpec
 
 EnvMaker = Callable[[], gymnasium.Env[Any, Any]]
@@ -35,6 +37,14 @@ def _maker_by_spec(env: gymnasium.Env[Any, Any], max_episode_steps: int | None) 
     if spec is None or spec.id not in gymnasium.registry:
         return None
     return lambda: limited(gymnasium.make(spec, disable_env_checker=True), max_episode_steps)
+
+
+def close(env: gymnasium.Env[Any, Any]) -> None:
+    """Close an environment; what it raises then is no more than a warning, because nothing depends on it."""
+    try:
+        env.close()
+    except (Exception, SystemExit) as error:
+        warnings.warn(f"the environment raised when it was closed: {describe(error)}", stacklevel=2)
 
 
 def limited(env: gymnasium.Env[Any, Any], max_episode_steps: int | None) -> gymnasium.Env[Any, Any]:

@@ -83,9 +83,12 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
         return 1.0 - np.asarray(states, dtype=np.float64)[:, -1]
 
     def is_valid(self, states: Array) -> BoolArray:
-        """Return which states [B, N + 1] the environment calls valid [B]; within the bounds, where it says nothing."""
+        """Return which states [B, N + 1] the environment calls valid [B]; within the bounds, where it says nothing.
+
+        Whatever the flag: EST draws states near others until one is valid, and a drawn flag is never 0 or 1.
+        """
         states = np.asarray(states, dtype=np.float64)
-        flagged: BoolArray = (states[:, -1] == 0.0) | (states[:, -1] == 1.0)
+        flagged: BoolArray = (states[:, -1] >= 0.0) & (states[:, -1] <= 1.0)
         if self._offers.is_valid is not None and flagged.any():
             flagged[flagged] = self._offers.is_valid(states[flagged, :-1].copy())
         return flagged

@@ -169,8 +169,7 @@ def check_replays(env: Any) -> None:
 
 
 def _action(env: Any, rng: np.random.Generator) -> Any:
-    actions = ActionMap.of(env.action_space)
-    return actions.to_action(rng.uniform(actions.low, actions.high))
+    return ActionMap.of(env.action_space).draw(rng)
 
 
 def _walk(env: Any, actions: list[Array]) -> list[bytes]:
