@@ -118,6 +118,11 @@ def _check_options(words: Sequence[str], parser: Parser) -> None:
 def _doctor(verb: Parser) -> None:
     """show versions, known bad pairs, plug-ins found, and whether an environment is resettable"""
     _add_environment(verb, required=False)
+    verb.add_argument("--all", action="store_true",
+                      help="check every environment that is registered here, and write a page; again to continue")
+    verb.add_argument("--max-seconds", type=seconds, default=60.0, metavar="S",
+                      help="of --all: how long one environment may take (60)")
+    verb.add_argument("--out", metavar="DIR", help="of --all: folder of environments.md and .json (runs/doctor)")
 
 
 def _plan(verb: Parser) -> None:
