@@ -1,4 +1,4 @@
-"""The task as one object: names that tell tasks apart, values that files hold and give back."""
+"""The task as one object: different tasks have different names, values come back from files."""
 
 from typing import Any
 
