@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
+from pbcs_ompl.core.checked import check_fields
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption
 from pbcs_ompl.core.plain import plain
 
@@ -22,7 +23,7 @@ class EnvSpec:
         max_episode_steps: Steps after which an episode is cut off; None for the limit that the id is registered with.
 
     Raises:
-        InvalidOption: `start_seed` is no integer >= 0, `max_episode_steps` none >= 1, or `reset_options` no dictionary.
+        InvalidOption: a value has another type, `start_seed` is not >= 0, or `max_episode_steps` not >= 1.
     """
 
     id: str
@@ -34,10 +35,9 @@ class EnvSpec:
     max_episode_steps: int | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self)
         _check_integer("start_seed", self.start_seed, 0)
         _check_integer("max_episode_steps", self.max_episode_steps, 1)
-        if not isinstance(self.reset_options, dict | None):
-            raise InvalidOption(f"reset_options is {self.reset_options!r}; expected a dictionary")
 
     def reset_seed(self, seed: int | None) -> int | None:
         """Return the seed of the reset in an episode that was given `seed`."""

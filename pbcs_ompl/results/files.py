@@ -32,9 +32,13 @@ Content = TypeVar("Content")
 
 @contextmanager
 def write_errors(path: Path) -> Iterator[None]:
-    """Turn an OSError while writing below `path` into a RunFolderError of one line."""
+    """Turn an OSError while writing below `path`, or a name that no file has, into a RunFolderError of one line."""
     try:
+        if b"\0" in os.fsencode(path):
+            raise RunFolderError(f"{str(path)!a} is no name of a file: it holds a null byte")
         yield
+    except UnicodeEncodeError as error:
+        raise RunFolderError(f"{str(path)!a} is no name of a file: {error.reason}") from error
     except OSError as error:
         if error.errno == errno.ENOSPC:
             raise RunFolderError(f"the disk is full: could not write {path}; free some space and resume") from error

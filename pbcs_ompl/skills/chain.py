@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -127,6 +128,7 @@ class SkillChain:
         first = self.start if state is None else state
         return self.rollouts(model, first[None], epsilon=epsilon, rng=rng, max_steps=max_steps).states
 
+    @checked
     def save(self, folder: str | Path) -> None:
         """Write chain.json (structure), chain.npz (activation sets and targets) and chain.safetensors (policies)."""
         folder = Path(folder)
@@ -141,6 +143,7 @@ class SkillChain:
             "skills": [{"activation": kind_of(s.activation), "target": kind_of(s.target)} for s in self.skills]})
 
     @classmethod
+    @checked
     def load(cls, folder: str | Path) -> "SkillChain":
         """Read a chain that `save` wrote.
 

@@ -6,6 +6,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -15,6 +16,8 @@ from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.skills.chain import SkillChain
+
+MOST_EPISODES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ class Evaluation:
                 "steps_median": self.steps_median, "epsilon": self.epsilon}
 
 
+@checked
 def evaluate(controller: SkillChain, env: str | EnvSpec | gymnasium.Env | ResettableModel | None = None, *,
              env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
              feature: str | FeatureRule | None = None, start_seed: int | None = None, episodes: int = 100,
@@ -73,7 +77,7 @@ def evaluate(controller: SkillChain, env: str | EnvSpec | gymnasium.Env | Resett
     if not isinstance(controller, SkillChain):
         raise InvalidOption(f"controller is {controller!r}; expected a SkillChain, such as train(...).chain or "
                             "SkillChain.load(folder)")
-    check_range("episodes", episodes, episodes >= 1, "at least 1")
+    check_range("episodes", episodes, 1 <= episodes <= MOST_EPISODES, f"from 1 to {MOST_EPISODES}")
     check_range("epsilon", epsilon, 0 <= epsilon <= 1, "within [0, 1]")
     if env is None and (env_kwargs or goal is not None or feature is not None or start_seed is not None):
         raise InvalidOption("env is None; expected an environment beside env_kwargs, goal, feature and start_seed, "
