@@ -152,6 +152,7 @@ def _train(verb: Parser) -> None:
                       help="stop after N environment steps (10,000,000)")
     _add_out(verb)
     verb.add_argument("--resume", metavar="DIR", help="continue a training that was stopped")
+    _add_trust(verb, "the folder of --resume")
 
 
 def _eval(verb: Parser) -> None:
@@ -162,6 +163,7 @@ def _eval(verb: Parser) -> None:
                       help="probability of a random action in each step (0)")
     verb.add_argument("--video", metavar="FILE", help="film the first rollout; .mp4 or .gif")
     verb.add_argument("--out", metavar="DIR", help="new folder for the numbers, which pbcs report shows (none)")
+    _add_trust(verb, "the folder")
 
 
 def _compare(verb: Parser) -> None:
@@ -239,6 +241,11 @@ def _add_seed(verb: Parser) -> None:
 def _add_budget(verb: Parser, default: int) -> None:
     verb.add_argument("--max-transitions", type=integer(1), default=default, metavar="N",
                       help=f"stop after N environment steps ({default:,})")
+
+
+def _add_trust(verb: Parser, source: str) -> None:
+    verb.add_argument("--trust", action="store_true",
+                      help=f"run the code of the modules that {source} names; only for folders of people you trust")
 
 
 def _add_out(verb: Parser) -> None:

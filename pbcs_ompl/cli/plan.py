@@ -18,7 +18,7 @@ from pbcs_ompl.results.command_line import command, environment_words
 
 
 def run(arguments: Namespace) -> int:
-    """Plan, draw, report. Returns 1 when the goal was not reached within the budget."""
+    """Plan, draw, report. Returns 1 when the environment does not grant the goal to a plan."""
     out = Path(arguments.out or fresh_folder("plan", arguments.env, arguments.planner, arguments.seed))
     model = make(environment(arguments))
     note_rules(model)
@@ -45,10 +45,12 @@ def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[
               f"({rate} transitions/s)")
     lines = [("solved" if result.solved else "not solved", effort), ("tree", f"{format_number(result.nodes)} nodes")]
     if result.solved:
-        replay = "replays exactly" if result.replay_ok else "DOES NOT REPLAY (not deterministic?)"
-        lines.append(("path", f"{format_number(result.path_length)} steps, {replay}"))
+        lines.append(("path", f"{format_number(result.path_length)} steps, verified in a fresh environment"))
         words = environment_words(environment(arguments))
         following = command(["train", *words, "--path", str(out)])
+    elif result.found:
+        lines.append(("FAILED", str(result.reason)))
+        following = command(["doctor", *environment_words(environment(arguments))])
     else:
         following = "the same with a larger --max-transitions or --max-seconds, or another --planner"
     return [*lines, ("files", list_files(out)), ("next", following)]

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 
 from pbcs_ompl.cli.streams import print_error, print_output
-from pbcs_ompl.core.formatting import format_duration, format_number
+from pbcs_ompl.core.formatting import format_duration, format_number, one_line, printable
 from pbcs_ompl.core.plain import plain
 
 SECONDS_BETWEEN_LINES = 10.0
@@ -75,7 +75,7 @@ class ProgressDisplay:
             self._last_line = now
             rows = ("  " + ", ".join(f"{name} {format_number(value)}" for name, value in row.items())
                     for row in numbers.get("table", []))
-            print_error(text, *rows)
+            print_error(*map(printable, [text, *rows]))
 
     def _share(self, numbers: dict[str, Any], seconds: float) -> float | None:
         """Return the share that is done, in [0, 1]; None if unknown."""
@@ -111,14 +111,14 @@ def _table(rows: Sequence[dict[str, Any]]) -> Table | None:
 def print_summary(result: dict[str, Any], lines: Sequence[tuple[str, str]], *, as_json: bool) -> None:
     """Print the closing summary, and the JSON object as the last line on stdout if it was asked for."""
     show = print_error if as_json else print_output
-    show(*(f"{name:<9} {text}" for name, text in lines))
+    show(*(printable(f"{name:<9} {text}") for name, text in lines))
     if as_json:
         print_output(json.dumps(result, default=plain))
 
 
 def warn(message: str) -> None:
     """Print one line on stderr."""
-    print_error(f"pbcs: {' '.join(message.split())}")
+    print_error(f"pbcs: {one_line(message)}")
 
 
 def list_files(folder: Path) -> str:

@@ -13,6 +13,7 @@ from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary, w
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import format_duration, format_number, format_rate
 from pbcs_ompl.core.signals import with_remedy
+from pbcs_ompl.core.trust import module_names
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words, resume_words
 from pbcs_ompl.results.files import CHAIN, CONFIG, TRAJECTORY
@@ -35,12 +36,13 @@ def run(arguments: Namespace) -> int:
         result = _train(arguments, out)
     except KeyboardInterrupt as error:
         if (out / CONFIG).is_file():
-            raise with_remedy(error, f"continue with: {command(resume_words(out))}") from None
+            again = command(resume_words(out, trust=_names_modules(arguments)))
+            raise with_remedy(error, f"continue with: {again}") from None
         raise
     if result.reason is not None:
         warn(result.reason)
     _draw(result.summary(), result.chain, result.trajectory, out)
-    print_summary(result.summary(), _closing_lines(result, out), as_json=arguments.json)
+    print_summary(result.summary(), _closing_lines(arguments, result, out), as_json=arguments.json)
     return 0 if result.solved else 1
 
 
@@ -48,7 +50,7 @@ def _train(arguments: Namespace, out: Path) -> TrainResult:
     budget = {} if arguments.max_transitions is None else {"max_transitions": arguments.max_transitions}
     with ProgressDisplay("train", budget=arguments.max_transitions) as display:
         if arguments.resume:
-            return resume(out, on_progress=display, **budget)
+            return resume(out, trust=arguments.trust, on_progress=display, **budget)
         trajectory = None if arguments.path is None else _read_trajectory(Path(arguments.path))
         return train(environment(arguments), trajectory=trajectory, out=out,
                      method=arguments.method, planner=arguments.planner, planner_kwargs=arguments.planner_kwargs,
@@ -61,7 +63,7 @@ def _refuse_other_options(arguments: Namespace) -> None:
     """A resumed run has the settings of its folder; only its budget may change."""
     defaults = vars(build_parser().parse_args(["train"]))
     for name, value in vars(arguments).items():
-        if name not in ("resume", "json", "max_transitions") and value != defaults[name]:
+        if name not in ("resume", "trust", "json", "max_transitions") and value != defaults[name]:
             raise InvalidOption(f"--resume takes every setting but --max-transitions from "
                                 f"{arguments.resume}; remove --{name.replace('_', '-')}")
 
@@ -92,7 +94,12 @@ def _draw(result: dict[str, Any], chain: SkillChain | None, trajectory: Trajecto
     draw_chain(model, chain, None if trajectory is None else trajectory.states, rollout, title, out)
 
 
-def _closing_lines(result: TrainResult, out: Path) -> list[tuple[str, str]]:
+def _names_modules(arguments: Namespace) -> bool:
+    """Return whether a folder of this command names modules, so that reading it takes --trust."""
+    return arguments.trust or any(module_names(list(vars(arguments).values())))
+
+
+def _closing_lines(arguments: Namespace, result: TrainResult, out: Path) -> list[tuple[str, str]]:
     effort = (f"{format_number(result.plan_transitions)} transitions of planning, "
               f"{format_number(result.train_transitions)} of training, {format_number(result.updates)} updates, "
               f"{format_duration(result.seconds)}")
@@ -103,8 +110,11 @@ def _closing_lines(result: TrainResult, out: Path) -> list[tuple[str, str]]:
         lines.append(("rollout", f"{format_number(result.nominal.steps_median)} steps to the goal without noise"))
     if result.robust is not None:
         rate = format_rate(result.robust.success_rate, result.robust.wilson)
-        lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions"))
+        lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions, in fresh environments"))
     lines.append(("files", list_files(out)))
+    if result.complete and result.chain is None:
+        return lines
+    trust = _names_modules(arguments)
     if result.complete:
-        return [*lines, ("next", command(eval_words(out, epsilon=0.2)))]
-    return [*lines, ("next", f"{command(resume_words(out))} --max-transitions N, with a larger N")]
+        return [*lines, ("next", command(eval_words(out, epsilon=0.2, trust=trust)))]
+    return [*lines, ("next", f"{command(resume_words(out, trust=trust))} --max-transitions N, with a larger N")]

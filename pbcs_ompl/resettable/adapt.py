@@ -20,7 +20,8 @@ from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, check_
 from pbcs_ompl.resettable.attributes import EnvAttributes, misspelt
 from pbcs_ompl.resettable.fresh import episode_limit, fresh_maker
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
-from pbcs_ompl.resettable.supported import check_flattenable, check_observations, unwrap
+from pbcs_ompl.resettable.supported import task_env
+from pbcs_ompl.resettable.task_env import bare
 
 HOW_TO = (
     "implement `get_env_state() -> array [D]` and `set_env_state(array)` beside `step` (simple), or the "
@@ -29,40 +30,44 @@ HOW_TO = (
 MODEL_MEMBERS = {*ResettableModel.__annotations__, *(n for n in vars(ResettableModel) if not n.startswith("_"))}
 
 
-def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None) -> ResettableModel:
+def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None,
+          reset_options: dict[str, Any] | None = None) -> ResettableModel:
     """Return `env` as a `ResettableModel`; a model that is already adapted is returned as it is.
 
     The first that fits: its own `VectorisedEnv` protocol, its own `get_env_state` and `set_env_state`, MuJoCo,
     classic control, deep copies if they prove faithful, and replayed actions, with a warning that this is slow.
-    The model works on `env.unwrapped` and moves it about: give it an environment of its own.
+    The model moves the environment within the wrappers about: give it one of its own. Wrappers that only transform
+    actions, observations or rewards stay around it (see `supported.task_env`).
 
     Args:
         env: A `gymnasium.Env`.
         goal: What a success is, in place of what the environment reports (see `rules.goal_rule`).
         feature: What planners explore, in place of the adapter's choice (see `rules.feature_rule`).
+        reset_options: What every reset gets as `options`.
 
     Raises:
-        NotResettable: its states cannot be restored, or a wrapper would be lost; says what to implement.
-        UnsupportedSpace: its actions are no finite vector Box, or its observations no vector Box.
+        NotResettable: its states cannot be restored, or a wrapper may have a memory; says what to implement.
+        UnsupportedSpace: its actions are no finite vector, or its observations no vectors of numbers.
         InvalidOption: a rule does not parse, or does not fit the environment.
     """
     if not isinstance(env, gymnasium.Env):
         return adapt_without_copy(env, goal=goal, feature=feature)
     make_env = fresh_maker(env)  # before anything runs in it
-    model = adapt_without_copy(env, goal=goal, feature=feature)
+    model = adapt_without_copy(env, goal=goal, feature=feature, reset_options=reset_options)
     model.make_env = make_env
     return model
 
 
 def adapt_without_copy(env: Any, *, goal: str | GoalRule | None = None,
-                       feature: str | FeatureRule | None = None) -> ResettableModel:
+                       feature: str | FeatureRule | None = None,
+                       reset_options: dict[str, Any] | None = None) -> ResettableModel:
     """Return `env` as a `ResettableModel` that has no `make_env`; see `adapt`."""
     if not isinstance(env, gymnasium.Env):
         if goal is not None or feature is not None:
             raise InvalidOption("a goal or feature can be given to a gymnasium.Env only, not to its adapted model")
         return _as_model(env)
     limit = episode_limit(env)
-    model = _choose(unwrap(env), goal, feature)
+    model = _choose(task_env(env, reset_options), goal, feature)
     if limit is not None:
         model.episode_limit = model.max_episode_steps = limit
     return model
@@ -74,15 +79,12 @@ def _choose(inner: Any, goal: Any, feature: Any) -> ResettableModel:
     if isinstance(inner, SuccessFlagEnv):
         return _as_model(GetSetStateModel(inner))
     ActionMap.of(inner.action_space)  # before anything runs
-    _warn_of_misspelt(inner)
+    _warn_of_misspelt(bare(inner))
     ruled = goal is not None or feature is not None
     if isinstance(inner, VectorisedEnv) and not ruled:
-        check_observations(cast(gymnasium.Env[Any, Any], inner))
         return _as_model(VectorisedModel(inner))
     if isinstance(inner, GetSetEnv) and not (is_mujoco_env(inner) and not _is_vector(inner)):
-        check_observations(cast(gymnasium.Env[Any, Any], inner))
         return _model_of(VectorEnv(inner, goal, feature)) if ruled else _get_set(inner)
-    check_flattenable(inner)
     return _model_of(_restorable(inner, goal, feature))
 
 
@@ -92,7 +94,7 @@ def _get_set(inner: Any) -> ResettableModel:
         return _as_model(GetSetStateModel(inner))
     model = GetSetStateModel(SuccessFlagEnv(inner, offers))
     if inner.spec is None:
-        model.spec = EnvSpec(type(inner).__qualname__)
+        model.spec = EnvSpec(type(bare(inner)).__qualname__)
     return _as_model(model)
 
 
@@ -138,4 +140,4 @@ def _as_model(model: Any) -> ResettableModel:
 
 
 def _name(env: gymnasium.Env) -> str:
-    return env.spec.id if env.spec is not None else type(env).__name__
+    return env.spec.id if env.spec is not None else type(bare(env)).__name__

@@ -166,18 +166,15 @@ class _Trial:
         return self.first.difference(self.roll(self.env, self.start))
 
     def elsewhere(self) -> str:
-        if self.env.spec is None:
+        if self.model.make_env is None:
             return self.first.difference(self.roll(deepcopy(self.env), self.start))
-        other = self._second()
+        spec = self.model.spec
+        other: Any = adapt(self.model.make_env(), goal=spec.goal, feature=spec.feature,
+                           reset_options=spec.reset_options).env
         other.reset(seed=54321)
         found = self.first.difference(self.roll(other, self.start))
         other.close()
         return found
-
-    def _second(self) -> Any:
-        fresh: Any = gymnasium.make(self.env.spec).unwrapped
-        spec = self.model.spec
-        return adapt(fresh, goal=spec.goal, feature=spec.feature).env
 
     def spelling(self) -> str:
         return "; ".join(f"{name!r} is not read; did you mean {meant!r}?"

@@ -2,6 +2,7 @@
 
 import inspect
 import os
+import sys
 from contextlib import redirect_stderr
 from dataclasses import replace
 from functools import partial
@@ -64,14 +65,16 @@ def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[
         return _make(replace(env, **given), env.goal if goal is None else goal,  # type: ignore[arg-type]
                      env.feature if feature is None else feature)
     with code_of_others(f"the environment {type(env).__name__}"):
-        return _with_rules(adapt(env, goal=goal, feature=feature), given)
+        return _with_rules(adapt(env, goal=goal, feature=feature, reset_options=reset_options), given)
 
 
 def _make(spec: EnvSpec, goal: str | GoalRule | None, feature: str | FeatureRule | None) -> ResettableModel:
     load_environments()
     prefer_headless_rendering()
+    spec = replace(spec, goal=goal if isinstance(goal, str) else None,
+                   feature=feature if isinstance(feature, str) else None)
     with code_of_others(f"the environment {spec.id!r}"):
-        model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature)
+        model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature, reset_options=spec.reset_options)
     model.spec = replace(model.spec, id=spec.id, start_seed=spec.start_seed, reset_options=spec.reset_options,
                          max_episode_steps=spec.max_episode_steps)  # the id with its module, if it names one
     model.make_env = partial(fresh_env, spec)
@@ -91,6 +94,7 @@ def fresh_env(spec: EnvSpec) -> gymnasium.Env[Any, Any]:
 
 
 def _gymnasium_make(spec: EnvSpec, **options: Any) -> gymnasium.Env[Any, Any]:
+    spec.check_trusted(known=[spec.id] if is_registered(spec.id) else [])
     registered = _find(spec.id)
     try:
         _check_options(registered, spec.kwargs)
@@ -123,6 +127,12 @@ def _with_rules(model: ResettableModel, rules: dict[str, Any]) -> ResettableMode
         model.episode_limit = model.max_episode_steps = steps
         model.make_env = None if make_env is None else lambda: limited(make_env(), steps)
     return model
+
+
+def is_registered(env_id: str) -> bool:
+    """Return whether Gymnasium knows this id, and nothing has to be imported for it."""
+    module, _, name = env_id.rpartition(":")
+    return name in gymnasium.registry and (not module or module in sys.modules)
 
 
 def is_known(env_id: str) -> bool:

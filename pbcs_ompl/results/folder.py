@@ -24,8 +24,9 @@ from pbcs_ompl.results.files import (
     write_toml,
 )
 from pbcs_ompl.results.provenance import provenance
+from pbcs_ompl.results.schema import CONFIGS, RESULTS, Provenance, check
 
-KINDS = ("plan", "train", "eval", "compare", "study")
+KINDS = tuple(CONFIGS)
 """What a folder may hold: the `kind` of its config.toml, named after the verb that wrote it."""
 LOCK = ".lock"
 
@@ -82,7 +83,7 @@ class RunFolder:
     def _note_provenance(self) -> None:
         """Add this process to those that worked here, unless one with the same versions and machine did."""
         path = self.path / PROVENANCE
-        before = read_json(path) if path.is_file() else []
+        before = read_json(path, Provenance) if path.is_file() else []
         if provenance() not in before:
             write_json(path, [*before, provenance()])
 
@@ -201,11 +202,24 @@ def find_folders(root: Path) -> list[Path]:
 
 
 def _walk(root: Path) -> Iterator[Path]:
-    for place, folders, files in os.walk(root):
-        if CONFIG in files:
-            folders.clear()
+    waiting = [str(root)]
+    while waiting:  # os.walk calls itself for each level
+        place = waiting.pop()
+        entries = _entries(place)
+        if any(entry.name == CONFIG and not entry.is_dir() for entry in entries):
             yield Path(place)
-        folders[:] = [name for name in folders if not name.startswith(".")]
+        else:
+            waiting += [entry.path for entry in entries
+                        if entry.is_dir(follow_symlinks=False) and not entry.name.startswith(".")]
+
+
+def _entries(place: str) -> list["os.DirEntry[str]"]:
+    """Return what is in a folder; nothing where that cannot be read."""
+    try:
+        with os.scandir(place) as entries:
+            return list(entries)
+    except OSError:
+        return []
 
 
 def read_folder(path: Path) -> Folder:
@@ -215,9 +229,9 @@ def read_folder(path: Path) -> Folder:
         DamagedFile: a file in it is damaged, or its settings are not those of a run.
     """
     config = read_config(path)
-    result = read_json(path / RESULT) if (path / RESULT).is_file() else None
-    if not isinstance(result, dict | None):
-        raise DamagedFile(f"{path / RESULT} is not a result; expected a JSON object")
+    kind = config["kind"]
+    check(path / CONFIG, config, CONFIGS[kind])
+    result = read_json(path / RESULT, RESULTS[kind], finite=kind != "study") if (path / RESULT).exists() else None
     return Folder(path, config["kind"], config, result, _provenance(path, config))
 
 
@@ -241,9 +255,7 @@ def read_config(path: Path, kind: str | None = None) -> dict[str, Any]:
 def _provenance(path: Path, config: dict[str, Any]) -> list[dict[str, str]]:
     if not (path / PROVENANCE).is_file():
         return [config["versions"]] if "versions" in config else []
-    found = read_json(path / PROVENANCE)
-    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
-        raise DamagedFile(f"{path / PROVENANCE} is damaged: expected a list of JSON objects")
+    found: list[dict[str, str]] = read_json(path / PROVENANCE, Provenance)
     return found
 
 
@@ -259,9 +271,11 @@ def lock(path: Path, *, wait: bool = False) -> Iterator[None]:
         wait: Wait until no other process holds it.
 
     Raises:
-        RunFolderError: another process holds it.
+        RunFolderError: another process holds it, or it is a link, which would lead elsewhere.
         OSError: the file cannot be written, or its disk supports no locks.
     """
+    if path.is_symlink():
+        raise RunFolderError(f"{path} is a link; remove it, or choose another --out")
     file = FileLock(path, thread_local=False, poll_interval=POLL_SECONDS, fallback_to_soft=False)
     try:
         file.acquire(timeout=-1 if wait else 0)

@@ -13,6 +13,8 @@ from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel, Step
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.rules import FeatureRule, Outcome, feature_rule
+from pbcs_ompl.resettable.supported import task_env
+from pbcs_ompl.resettable.task_env import bare
 
 MOVED_BY_RESET = ("body_pos", "body_quat", "site_pos", "geom_pos")
 """Parts of a model that environments move about in `reset`: goals, hinges, boards."""
@@ -49,7 +51,7 @@ class MujocoEnv(RestorableEnv):
 
     def default_feature(self) -> FeatureRule:
         """Return the achieved goal where there is one, else the first two positions."""
-        if isinstance(self.inner.observation_space, gymnasium.spaces.Dict):
+        if isinstance(bare(self.inner).observation_space, gymnasium.spaces.Dict):
             return feature_rule("achieved_goal")
         return feature_rule("qpos[0:2]" if self.inner.model.nq > 1 else "qpos[0]")
 
@@ -147,7 +149,7 @@ class MujocoModel(GetSetStateModel):
         self._pool: ThreadPoolExecutor | None = None
 
     def _steps(self, states: Array, controls: Array) -> list[Step]:
-        if min(len(states), self._threads) < 2 or self.env.spec is None:
+        if min(len(states), self._threads) < 2 or self.make_env is None:
             return super()._steps(states, controls)
         if self._pool is None:
             self._open_pool()
@@ -159,8 +161,9 @@ class MujocoModel(GetSetStateModel):
         return done + [step for job in jobs for step in job.result()]
 
     def _open_pool(self) -> None:
+        assert self.make_env is not None
         for _ in range(self._threads - 1):
-            inner = gymnasium.make(self.env.spec).unwrapped
+            inner = task_env(self.make_env(), self.spec.reset_options)
             self._others.append(MujocoEnv(inner, self.env.goal_rule, self.env.feature_rule))
         self._pool = ThreadPoolExecutor(self._threads - 1, thread_name_prefix="mujoco")
 

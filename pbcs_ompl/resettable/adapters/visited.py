@@ -53,6 +53,10 @@ class VisitedEnv(RestorableEnv):
         """Return the observation that was made when the present state was visited."""
         return self._observations[self._name]
 
+    def seen(self, observation: Any) -> Any:
+        """Return an observation as it is: the wrappers saw it when it was made."""
+        return observation
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         """Reset with a seed, a random one if need be, so that the start can be found again."""
         seed = int(np.random.default_rng().integers(2**32)) if seed is None else seed
@@ -165,8 +169,7 @@ def check_replays(env: Any) -> None:
 
 
 def _action(env: Any, rng: np.random.Generator) -> Any:
-    actions = ActionMap.of(env.action_space)
-    return actions.to_action(rng.uniform(actions.low, actions.high))
+    return ActionMap.of(env.action_space).draw(rng)
 
 
 def _walk(env: Any, actions: list[Array]) -> list[bytes]:
