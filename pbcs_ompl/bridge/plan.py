@@ -18,6 +18,7 @@ from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory
 from pbcs_ompl.bridge.tree import load_tree, save_tree, tree_of
 from pbcs_ompl.bridge.verification import Verification, verify
 from pbcs_ompl.core.callbacks import code_of_others
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, PbcsError
 from pbcs_ompl.core.interfaces import BatchPlanner, ResettableModel
@@ -29,7 +30,7 @@ from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
-from pbcs_ompl.results.files import CONFIG, PROVENANCE, RESULT, TRAJECTORY, TREE
+from pbcs_ompl.results.files import CONFIG, PROVENANCE, RESULT, TRAJECTORY, TREE, write_errors
 from pbcs_ompl.results.folder import RunFolder, read_folder, start_run
 from pbcs_ompl.results.provenance import planning_versions
 
@@ -85,6 +86,7 @@ class PlanResult:
                 "env": self.env, "seed": self.seed, "out": self.out}
 
 
+@checked
 def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "Ex", *,
          env_kwargs: dict[str, Any] | None = None, planner_kwargs: dict[str, Any] | None = None,
          goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
@@ -246,7 +248,8 @@ def _new_folder(out: str | Path | None, config: dict[str, Any]) -> Iterator[RunF
     if out is None:
         yield None
         return
-    existed = Path(out).exists()
+    with write_errors(Path(out)):
+        existed = Path(out).exists()
     with start_run(Path(out), config, may_change=("planner_kwargs", "versions"), parts=PARTS) as folder:
         try:
             yield folder

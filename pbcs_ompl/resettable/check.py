@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 
 from pbcs_ompl.core.callbacks import describe
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, PbcsError, UnknownName
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -76,6 +77,7 @@ class _Roll:
         return ""
 
 
+@checked
 def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
                      env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
                      feature: str | FeatureRule | None = None, start_seed: int | None = None,
