@@ -69,7 +69,8 @@ def _first_difference(trajectory: Trajectory, model: ResettableModel) -> int | N
         return trajectory.first_difference(model)
     env = model.make_env()
     try:
-        second = adapt_without_copy(env, goal=model.spec.goal, feature=model.spec.feature)
+        second = adapt_without_copy(env, goal=model.spec.goal, feature=model.spec.feature,
+                                    reset_options=model.spec.reset_options)
         second.spec = model.spec
         return trajectory.first_difference(second)
     finally:

@@ -6,6 +6,7 @@ from pbcs_ompl.cli.streams import print_error
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.feature_bounds import narrow_words
 
 
 def describe(model: ResettableModel) -> dict[str, Any]:
@@ -19,7 +20,9 @@ def feature_words(model: ResettableModel) -> str:
     """Return what is explored, within which bounds, and where these come from."""
     env = model.env
     rule = model.spec.feature or "the adapter's choice"
-    source = f", from {env.bounds_from}" if isinstance(env, RestorableEnv) else ""
+    source = ""
+    if isinstance(env, RestorableEnv):
+        source = f", from {env.bounds.source}" + (f"; {narrow_words(env.bounds)}" if env.bounds.narrow else "")
     return f"{rule}: {_vector(model.feature_low)} to {_vector(model.feature_high)}{source}"
 
 

@@ -22,6 +22,7 @@ from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.resettable.fresh import EnvMaker, close
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rules import GoalRule, Outcome, goal_rule, granted_success
+from pbcs_ompl.resettable.task_env import explored_actions
 
 SIDE_BY_SIDE = 20
 """Episodes that a controller drives at the same time, each in an environment of its own."""
@@ -180,7 +181,7 @@ class _Episode:
 def _drive(controller: Controller, episodes: list[_Episode], noise: list[np.random.Generator], epsilon: float,
            max_steps: int) -> list[Execution]:
     """Let a controller drive episodes side by side until all have ended."""
-    actions = ActionMap.of(episodes[0].env.action_space)
+    actions = ActionMap.of(explored_actions(episodes[0].env))
     controller.reset(len(episodes))
     for _ in range(max_steps):
         going = [k for k, episode in enumerate(episodes) if episode.ending is None]

@@ -38,9 +38,13 @@ MOST_BYTES, MOST_ARRAY_BYTES, MOST_ARRAYS = 1 << 28, 1 << 33, 100_000
 
 @contextmanager
 def write_errors(path: Path) -> Iterator[None]:
-    """Turn an OSError while writing below `path` into a RunFolderError of one line."""
+    """Turn an OSError while writing below `path`, or a name that no file has, into a RunFolderError of one line."""
     try:
+        if b"\0" in os.fsencode(path):
+            raise RunFolderError(f"{str(path)!a} is no name of a file: it holds a null byte")
         yield
+    except UnicodeEncodeError as error:
+        raise RunFolderError(f"{str(path)!a} is no name of a file: {error.reason}") from error
     except OSError as error:
         if error.errno == errno.ENOSPC:
             raise RunFolderError(f"the disk is full: could not write {path}; free some space and resume") from error
@@ -115,7 +119,7 @@ def read_json(path: Path, kind: Any = Any, *, finite: bool = True) -> Any:
     Raises:
         DamagedFile: the file is missing, truncated, not JSON, or holds something else than `kind`.
     """
-    value = _read(path, lambda: parse_json(read_bytes(path).decode(), finite=finite))
+    value = _read(path, lambda: parse_json(read_bytes(path).decode("utf-8"), finite=finite))
     check(path, value, kind)
     return value
 
@@ -130,7 +134,7 @@ def read_toml(path: Path, kind: Any = dict[str, Any]) -> dict[str, Any]:
     Raises:
         DamagedFile: the file is missing, does not parse, or holds something else than `kind`.
     """
-    table = _read(path, lambda: parse_toml(read_bytes(path).decode()))
+    table = _read(path, lambda: parse_toml(read_bytes(path).decode("utf-8")))
     check(path, table, kind)
     return table
 

@@ -9,7 +9,7 @@ import json
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
 
 STRUCTURE, SETS, POLICIES = "chain.json", "chain.npz", "chain.safetensors"
 FORMAT = "pbcs_ompl skill chain"
-VERSION = 4
+VERSION = 5
 
 
 class SkillWords(TypedDict):
@@ -39,8 +39,8 @@ class ChainWords(TypedDict):
 
     environment: EnvValues
     time_limit: Positive
-    reset_seed: Count | None
-    action_shape: list[Count]
+    reset_seed: NotRequired[Count]
+    action_shape: list[Positive]
     skills: list[SkillWords]
     sha256: dict[str, str]
 

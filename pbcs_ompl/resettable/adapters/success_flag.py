@@ -7,16 +7,22 @@ import numpy as np
 
 from pbcs_ompl.core.errors import NotResettable
 from pbcs_ompl.core.types import Array, BoolArray
+from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.attributes import EnvAttributes
+from pbcs_ompl.resettable.bounds import widened
+from pbcs_ompl.resettable.observations import flat_bounds
+from pbcs_ompl.resettable.observing import missing_observe, observed_type, reset_options, state_observer
+from pbcs_ompl.resettable.rules import Outcome, reported_success
 from pbcs_ompl.resettable.sampling import uniform_in_ball
+from pbcs_ompl.resettable.task_env import bare
 
 
 class SuccessFlagEnv(gymnasium.Env[Array, Array]):
     """An environment with `get_env_state` and `set_env_state` but no `goal_distance`.
 
     Its state is [state of the environment N | success]. The last number is 1 where the step that led there was a
-    success: what `info["is_success"]` or `info["success"]` says, else `terminated`. So success is a function of the
-    state, in any process. States that no step has reached, as those of a reset or of a ball, are no successes.
+    success (see `rules.reported_success`). So success is a function of the state, in any process. States that no step
+    has reached, as those of a reset or of a ball, are no successes.
 
     Args:
         inner: The environment without wrappers.
@@ -33,13 +39,14 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
         self.spec, self.render_mode = inner.spec, inner.render_mode
         self.action_space, self.observation_space = inner.action_space, inner.observation_space
         self._success = 0.0
-        observation, _ = inner.reset(seed=0)
+        observe = state_observer(inner, offers)
+        if observe is None:
+            raise missing_observe(inner)
+        self._observe = observe
+        inner.reset(seed=0)
         state = as_vector(inner, inner.get_env_state())
-        self._observes_state = observes_state(observation, state)
-        low, high = state_bounds(inner, offers, state, self._observes_state)
+        low, high = state_bounds(inner, offers, state)
         self.state_low, self.state_high = np.append(low, 0.0), np.append(high, 1.0)
-        if offers.observe is None and not self._observes_state:
-            raise NotResettable(missing_observe(inner))
         self.capabilities = offers.restores
         self.feature_dims = tuple(range(len(state))) if offers.feature_dims is None else offers.feature_dims
         # What the environment offers itself; `EnvAttributes` takes None for what is not offered.
@@ -56,8 +63,9 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Make one step of the environment."""
-        observation, reward, terminated, truncated, info = self.inner.step(action)
-        self._success = float(bool(info.get("is_success", info.get("success", terminated))))
+        observation, reward, terminated, truncated, info = self.inner.step(copied(action))
+        outcome = Outcome(self.inner, observation, float(reward), bool(terminated), info)
+        self._success = float(reported_success(outcome))
         return observation, float(reward), bool(terminated), bool(truncated), info
 
     def get_env_state(self) -> Array:
@@ -71,8 +79,7 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
 
     def observe(self, states: Array) -> Array:
         """Return the observations [B, O] of states [B, N + 1]."""
-        inner = np.array(states, dtype=np.float64)[:, :-1].copy()
-        return inner if self._offers.observe is None else self._offers.observe(inner)
+        return self._observe(np.array(states, dtype=np.float64)[:, :-1])
 
     def goal_distance(self, states: Array) -> Array:
         """Return 0 for successes, 1 for other states [B]."""
@@ -122,42 +129,33 @@ def as_vector(env: Any, state: Any) -> Array:
         NotResettable: it is none.
     """
     if not isinstance(state, np.ndarray | list | tuple) or np.ndim(state) != 1:
-        raise NotResettable(f"{type(env).__name__}.get_env_state() returned a {type(state).__name__}; "
+        raise NotResettable(f"{_name(env)}.get_env_state() returned a {type(state).__name__}; "
                             f"expected a vector of numbers")
     return np.array(state, dtype=np.float64)
 
 
-def observes_state(observation: Any, state: Array) -> bool:
-    """Return whether an observation is the state itself."""
-    return np.shape(observation) == state.shape and bool(np.array_equal(state, observation))
-
-
-def missing_observe(env: Any) -> str:
-    """Return the message for an environment whose states cannot be observed."""
-    return (f"{type(env).__name__}: the observation is not the state, so implement "
-            f"`observe(states [B, D]) -> observations [B, O]`")
-
-
-def state_bounds(env: Any, offers: EnvAttributes, state: Array, observes: bool) -> tuple[Array, Array]:
-    """Return the bounds of the state [N] that the environment declares, else those of its observations.
+def state_bounds(env: Any, offers: EnvAttributes, state: Array) -> tuple[Array, Array]:
+    """Return the bounds of the state [N] that the environment declares, else those of its observations, if it is one.
 
     Args:
         env: The environment.
         offers: Its optional attributes.
         state: One of its states [N].
-        observes: Whether the observation is the state.
 
     Raises:
         NotResettable: there are none, or they have another length.
     """
-    box = env.observation_space
     if offers.state_low is not None and offers.state_high is not None:
-        low, high = np.asarray(offers.state_low), np.asarray(offers.state_high)
-    elif observes and np.isfinite(box.low).all() and np.isfinite(box.high).all():
-        low, high = box.low, box.high
+        low, high = widened(offers.state_low, -np.inf), widened(offers.state_high, np.inf)
     else:
-        raise NotResettable(f"{type(env).__name__}: the bounds of its {len(state)} state dimensions are "
-                            f"unknown; set `state_low` and `state_high`")
+        low, high = flat_bounds(bare(env).observation_space)
+        if not np.isfinite(high - low).all() or observed_type(bare(env), reset_options(env)) is None:
+            raise NotResettable(f"{_name(env)}: the bounds of its {len(state)} state dimensions are "
+                                f"unknown; set `state_low` and `state_high`")
     if low.shape != state.shape:
-        raise NotResettable(f"{type(env).__name__}: state_low has {low.size} dimensions, the state has {len(state)}")
+        raise NotResettable(f"{_name(env)}: state_low has {low.size} dimensions, the state has {len(state)}")
     return low, high
+
+
+def _name(env: Any) -> str:
+    return type(bare(env)).__name__

@@ -83,7 +83,7 @@ def make_section(path: Path, root: Path) -> Section:
     changed = [(str(file), "was changed or removed after it was written") for file in changed_files(path)]
     content = replace(content, failures=[*changed, *content.failures])
     return Section(_name(path, root), folder.kind, content, [read_figure(picture) for picture in pictures],
-                   read_bytes(path / CONFIG).decode(), _versions(folder.provenance), repeating(folder),
+                   read_bytes(path / CONFIG).decode("utf-8"), _versions(folder.provenance), repeating(folder),
                    resuming(folder))
 
 
