@@ -66,7 +66,7 @@ def test_every_run_of_a_planner_that_misbehaves_is_recorded_and_the_others_conti
         assert row["transitions_median"] is None
     assert found.rows[4]["reason"] is None
     assert found.tests == []
-    assert len(list((tmp_path / "out/runs/1-Maze-v0").iterdir())) == 5
+    assert len(list((tmp_path / "out/runs/1-Maze-v0").glob("*.json"))) == 5
     with sqlite3.connect(tmp_path / "out/comparison.db") as database:
         assert database.execute("SELECT count(*) FROM runs WHERE status = 7").fetchone() == (4,)
 
@@ -92,7 +92,7 @@ def test_killed_comparison_resumes(misbehaving, tmp_path):
     process.kill()
     process.wait()
     wait_until(lambda: not alive(int(note.read_text())))
-    assert list(record.parent.iterdir()) == [record]
+    assert list(record.parent.glob("*.json")) == [record]
     assert len(read_comparison(out).runs) == 1
     with pytest.raises(RunFolderError, match="max_seconds"):
         compare(**{**settings, "max_seconds": 1.0})
