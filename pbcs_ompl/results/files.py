@@ -90,7 +90,7 @@ def write_text(path: Path, text: str) -> None:
 
 def write_json(path: Path, value: Any) -> None:
     """Write JSON atomically; NumPy numbers and arrays become plain ones."""
-    write_text(path, json.dumps(value, indent=2, default=plain) + "\n")
+    write_text(path, to_json(value))
 
 
 def write_toml(path: Path, table: dict[str, Any]) -> None:
@@ -191,6 +191,11 @@ def _read(path: Path, load: Callable[[], Content]) -> Content:
         raise DamagedFile(f"{path} does not exist") from error
     except Exception as error:  # zipfile, zlib, ValueError, EOFError, OSError: all mean the same to the user
         raise DamagedFile(f"{path} is damaged: {error}") from error
+
+
+def to_json(value: Any) -> str:
+    """Return a value as JSON; NumPy values and paths become plain ones."""
+    return json.dumps(value, indent=2, default=plain) + "\n"
 
 
 def to_toml(table: dict[str, Any]) -> str:

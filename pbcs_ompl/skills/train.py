@@ -18,6 +18,7 @@ from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.results.checksums import changed_files
 from pbcs_ompl.results.files import CHECKPOINT, CONFIG, RESULT, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.config import TrainConfig, read_config
@@ -106,6 +107,9 @@ def resume(folder: str | Path, *, max_transitions: int | None = None, trust: boo
             raise RunFolderError(f"the training in {opened.path} has ended; there is nothing to resume")
         environment, config, versions = read_config(opened.path / CONFIG, trust=trust)
         _warn_of_other_versions(opened.path, versions)
+        for file in changed_files(opened.path):
+            warnings.warn(f"{file} was changed after it was written; the training goes by what it says now",
+                          stacklevel=2)
         if max_transitions is not None:
             config = replace(config, max_transitions=max_transitions)
             opened.write_config(read_toml(opened.path / CONFIG) | {"max_transitions": max_transitions})
