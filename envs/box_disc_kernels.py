@@ -1,8 +1,8 @@
 """The steps of the box and the disc, compiled: arrays in, arrays out."""
 
 import numpy as np
-from numba import njit
 
+from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
 
@@ -14,7 +14,7 @@ EXTENT = FIRST_FREE
 DISC_X, DISC_Y, DISC_RADIUS, PERTURBATION = range(FIRST_FREE, FIRST_FREE + 4)
 
 
-@njit(cache=True)
+@njit()
 def _move_in_box(settings: Array, x: float, y: float, a: float, b: float) -> Step:
     x1, y1 = x + displacement(settings, a), y + displacement(settings, b)
     if x1 < 0.0 or x1 > settings[EXTENT] or y1 < 0.0 or y1 > settings[EXTENT]:
@@ -22,14 +22,14 @@ def _move_in_box(settings: Array, x: float, y: float, a: float, b: float) -> Ste
     return x1, y1, False
 
 
-@njit(cache=True)
+@njit()
 def step_one_in_box(settings: Array, x: float, y: float, a: float, b: float) -> Point:
     """Return the next position of one point as a tuple of two floats."""
     x1, y1, _ = _move_in_box(settings, x, y, a, b)
     return x1, y1
 
 
-@njit(cache=True)
+@njit()
 def move_in_box(settings: Array, states: Array, controls: Array) -> tuple[Array, BoolArray]:
     """Return the next states [B, 2] after controls [B, 2], and whether the border was hit [B]."""
     after = np.empty((states.shape[0], 2))
@@ -40,7 +40,7 @@ def move_in_box(settings: Array, states: Array, controls: Array) -> tuple[Array,
     return after, hits
 
 
-@njit(COMPILED_STEP, cache=True)
+@njit(COMPILED_STEP)
 def compiled_step_in_box(settings: Array, table: Array, integers: IndexArray, states: Array, parent: int,
                          controls: Array, child: int) -> tuple[float, bool, bool]:
     """Write states[child] from states[parent] and controls[child]; return reward, terminated, success."""
@@ -50,14 +50,14 @@ def compiled_step_in_box(settings: Array, table: Array, integers: IndexArray, st
     return outcome(settings, x, y, hit)
 
 
-@njit(cache=True)
+@njit()
 def _inside(settings: Array, x: float, y: float) -> bool:
     dx, dy = x - settings[DISC_X], y - settings[DISC_Y]
     inside: bool = dx * dx + dy * dy <= settings[DISC_RADIUS] * settings[DISC_RADIUS]
     return inside
 
 
-@njit(cache=True)
+@njit()
 def _mix(seed: np.uint64, value: float) -> np.uint64:
     """Return a 64-bit hash of `seed` and the bits of a float (the finaliser of splitmix64)."""
     z = (seed ^ np.float64(value).view(np.uint64)) + np.uint64(0x9E3779B97F4A7C15)
@@ -66,13 +66,13 @@ def _mix(seed: np.uint64, value: float) -> np.uint64:
     return z ^ (z >> np.uint64(31))
 
 
-@njit(cache=True)
+@njit()
 def _signed_fraction(bits: np.uint64) -> float:
     """Map 64 random bits to [-1, 1)."""
     return float(bits >> np.uint64(11)) * 2.0**-52 - 1.0
 
 
-@njit(cache=True)
+@njit()
 def _move_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> Step:
     x1, y1 = x + displacement(settings, a), y + displacement(settings, b)
     if _inside(settings, x1, y1) or x1 != x1 or y1 != y1:
@@ -85,14 +85,14 @@ def _move_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> St
     return x, y, True
 
 
-@njit(cache=True)
+@njit()
 def step_one_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> Point:
     """Return the next position of one point as a tuple of two floats."""
     x1, y1, _ = _move_in_disc(settings, x, y, a, b)
     return x1, y1
 
 
-@njit(cache=True)
+@njit()
 def move_in_disc(settings: Array, states: Array, controls: Array) -> tuple[Array, BoolArray]:
     """Return the next states [B, 2] after controls [B, 2], and whether the border was hit [B]."""
     after = np.empty((states.shape[0], 2))
@@ -103,7 +103,7 @@ def move_in_disc(settings: Array, states: Array, controls: Array) -> tuple[Array
     return after, hits
 
 
-@njit(COMPILED_STEP, cache=True)
+@njit(COMPILED_STEP)
 def compiled_step_in_disc(settings: Array, table: Array, integers: IndexArray, states: Array, parent: int,
                           controls: Array, child: int) -> tuple[float, bool, bool]:
     """Write states[child] from states[parent] and controls[child]; return reward, terminated, success."""
@@ -113,7 +113,7 @@ def compiled_step_in_disc(settings: Array, table: Array, integers: IndexArray, s
     return outcome(settings, x, y, hit)
 
 
-@njit(cache=True)
+@njit()
 def in_disc(settings: Array, states: Array) -> BoolArray:
     """Return which states [B, 2] lie in the disc [B]."""
     inside = np.empty(states.shape[0], dtype=np.bool_)

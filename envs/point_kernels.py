@@ -1,8 +1,8 @@
 """What the compiled steps of all point environments share: clipping, the goal, the reward."""
 
 import numpy as np
-from numba import njit
 
+from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array, BoolArray
 
 # Places of the settings in the array `settings`, which every kernel takes.
@@ -14,7 +14,7 @@ COMPILED_STEP = "Tuple((f8, b1, b1))(f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i
 child) writes states[child] and returns reward, terminated, success."""
 
 
-@njit(cache=True)
+@njit()
 def displacement(settings: Array, a: float) -> float:
     """Return how far a control moves the point along one axis; NaN stays NaN."""
     limit = settings[LIMIT]
@@ -26,14 +26,14 @@ def displacement(settings: Array, a: float) -> float:
     return moved
 
 
-@njit(cache=True)
+@njit()
 def _distance(settings: Array, x: float, y: float) -> float:
     dx, dy = x - settings[GOAL_X], y - settings[GOAL_Y]
     length: float = np.sqrt(dx * dx + dy * dy)
     return length
 
 
-@njit(cache=True)
+@njit()
 def goal_distance(settings: Array, states: Array) -> Array:
     """Return the Euclidean distances [B] of states [B, 2] to the centre of the goal."""
     distances = np.empty(states.shape[0])
@@ -42,7 +42,7 @@ def goal_distance(settings: Array, states: Array) -> Array:
     return distances
 
 
-@njit(cache=True)
+@njit()
 def outcome(settings: Array, x: float, y: float, hit: bool) -> tuple[float, bool, bool]:
     """Return reward, terminated and success of a step that ended in (x, y)."""
     reached = _distance(settings, x, y) < settings[GOAL_RADIUS]
@@ -50,7 +50,7 @@ def outcome(settings: Array, x: float, y: float, hit: bool) -> tuple[float, bool
     return reward, reached and settings[TERMINATE] != 0.0, reached
 
 
-@njit(cache=True)
+@njit()
 def finish(settings: Array, after: Array, hits: BoolArray) -> tuple[Array, BoolArray, BoolArray]:
     """Return rewards, terminated and success [B] of steps to `after` [B, 2] that hit a wall or not [B]."""
     count = after.shape[0]

@@ -5,8 +5,8 @@ All entry points share `_move`, so that one step and a batch of steps give the s
 """
 
 import numpy as np
-from numba import njit
 
+from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
 from pbcs_ompl.envs.wall_grid import CELLS_PER_UNIT
@@ -25,7 +25,7 @@ ROUNDING = 4e-16
 SLIDE, CELLS = FIRST_FREE, FIRST_FREE + 1
 
 
-@njit(cache=True)
+@njit()
 def hits_rectangle(x0: float, y0: float, x1: float, y1: float,
                    left: float, bottom: float, right: float, top: float) -> bool:
     """Return whether the segment (x0, y0)-(x1, y1) touches the closed rectangle.
@@ -52,7 +52,7 @@ def hits_rectangle(x0: float, y0: float, x1: float, y1: float,
     return not u - v > ROUNDING * (abs(u) + abs(v))
 
 
-@njit(cache=True)
+@njit()
 def _cell(x: float, cells: float) -> int:
     """Return the grid cell along one axis; total, NaN and the outside included."""
     scaled = x * CELLS_PER_UNIT
@@ -63,7 +63,7 @@ def _cell(x: float, cells: float) -> int:
     return int(scaled)
 
 
-@njit(inline="always", cache=True)
+@njit(inline="always")
 def _hits_any(rectangles: Array, lists: IndexArray, begin: int, end: int,
               x0: float, y0: float, x1: float, y1: float) -> bool:
     for k in range(begin, end):
@@ -73,7 +73,7 @@ def _hits_any(rectangles: Array, lists: IndexArray, begin: int, end: int,
     return False
 
 
-@njit(cache=True)
+@njit()
 def _entry(x0: float, y0: float, dx: float, dy: float,
            left: float, bottom: float, right: float, top: float) -> float:
     """Return the fraction of the step after which it is CLEARANCE short of the rectangle that it hits."""
@@ -87,7 +87,7 @@ def _entry(x0: float, y0: float, dx: float, dy: float,
     return stop_x if along_x > along_y else stop_y
 
 
-@njit(cache=True)
+@njit()
 def _slide(rectangles: Array, lists: IndexArray, begin: int, end: int,
            x0: float, y0: float, x1: float, y1: float) -> Point:
     """Return the last point of the step before the walls, or its start where there is no space to move."""
@@ -106,7 +106,7 @@ def _slide(rectangles: Array, lists: IndexArray, begin: int, end: int,
     return x, y
 
 
-@njit(inline="always", cache=True)
+@njit(inline="always")
 def _move(rectangles: Array, lists: IndexArray, settings: Array,
           x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
     """Return the next position, and whether the step hit a wall."""
@@ -124,7 +124,7 @@ def _move(rectangles: Array, lists: IndexArray, settings: Array,
     return x1, y1, True
 
 
-@njit(cache=True)
+@njit()
 def step_one(rectangles: Array, lists: IndexArray, settings: Array,
              x: float, y: float, a: float, b: float) -> Point:
     """Return the next position of one point as a tuple of two floats."""
@@ -132,7 +132,7 @@ def step_one(rectangles: Array, lists: IndexArray, settings: Array,
     return x1, y1
 
 
-@njit(cache=True)
+@njit()
 def move(rectangles: Array, lists: IndexArray, settings: Array,
          states: Array, controls: Array) -> tuple[Array, BoolArray]:
     """Return the next states [B, 2] after controls [B, 2], and whether a wall was hit [B]."""
@@ -145,7 +145,7 @@ def move(rectangles: Array, lists: IndexArray, settings: Array,
     return after, hits
 
 
-@njit(COMPILED_STEP, cache=True)
+@njit(COMPILED_STEP)
 def compiled_step(settings: Array, rectangles: Array, lists: IndexArray, states: Array, parent: int,
                   controls: Array, child: int) -> tuple[float, bool, bool]:
     """Write states[child] from states[parent] and controls[child]; return reward, terminated, success."""

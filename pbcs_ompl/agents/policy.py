@@ -92,6 +92,8 @@ class Policy:
             low, high = (np.array(arrays[name], dtype=np.float64) for name in ("low", "high"))
         except KeyError as error:
             raise DamagedFile(f"policy without the array {error}") from error
+        except (TypeError, ValueError) as error:
+            raise DamagedFile(f"policy with an array that has no numbers: {error}") from error
         _check(layers, low, high)
         return cls(layers, low, high)
 

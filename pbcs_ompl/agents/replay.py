@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from numba import njit
 from numpy.typing import NDArray
 from torch import Tensor
 
 from pbcs_ompl.agents.kernels.counter_rng import hashed, stream_keys
+from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 
 FIRST_ALLOCATION = 4096
@@ -127,7 +127,7 @@ class Replay:
         self._rows = larger
 
 
-@njit(cache=True)
+@njit()
 def _draw(keys: NDArray[np.uint64], start: int, sizes: IndexArray, stride: int, out: IndexArray) -> None:
     """Fill `out` [K, S, B] with flat row numbers; draw n of a seed is a function of its key and n."""
     count, seeds, batch_size = out.shape

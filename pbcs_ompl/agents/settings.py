@@ -32,7 +32,7 @@ def preset_version(name: str) -> int:
 def _read_preset(name: str) -> dict[str, Any]:
     if name not in preset_names():
         raise UnknownName("preset", name, preset_names())
-    return tomllib.loads(files("pbcs_ompl.agents").joinpath(f"{name}.toml").read_text())
+    return tomllib.loads(files("pbcs_ompl.agents").joinpath(f"{name}.toml").read_text("utf-8"))
 
 
 @dataclass(frozen=True)

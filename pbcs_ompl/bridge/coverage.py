@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
-from numba import njit
 
+from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
@@ -116,7 +116,7 @@ def _cells_per_axis(model: ResettableModel, edges: Array) -> IndexArray:
     return np.maximum(1, np.ceil(numbers - 1e-9)).astype(np.int64)
 
 
-@njit(cache=True)
+@njit()
 def _count_cells(states: Array, columns: IndexArray, low: Array, edges: Array, shape: IndexArray,
                  points: IndexArray, seen: BoolArray) -> IndexArray:
     """Return how many cells the first `points` [K] rows of states [N, D] lie in [K], by the dimensions `columns` [F].

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,22 +13,23 @@ from ompl import base as ob
 from pbcs_ompl.bridge.coverage import Coverage, TransitionRecorder
 from pbcs_ompl.bridge.planner_spec import PlannerSpec, as_batch_planner
 from pbcs_ompl.bridge.problem import CallbackState, Problem, make_problem
-from pbcs_ompl.bridge.termination import Limits, checked_limits, interruptible, make_stop
+from pbcs_ompl.bridge.termination import Limits, checked_limits, make_stop
 from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory
-from pbcs_ompl.bridge.tree import save_tree, tree_of
+from pbcs_ompl.bridge.tree import load_tree, save_tree, tree_of
 from pbcs_ompl.bridge.verification import Verification, verify
-from pbcs_ompl.core.callbacks import callback_failed
+from pbcs_ompl.core.callbacks import code_of_others
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.interfaces import BatchPlanner, ResettableModel
 from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.signals import interruptible
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.files import CONFIG, PROVENANCE, RESULT, TRAJECTORY, TREE
-from pbcs_ompl.results.folder import RunFolder
+from pbcs_ompl.results.folder import RunFolder, read_folder, start_run
 from pbcs_ompl.results.provenance import planning_versions
 
 
@@ -118,7 +119,9 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
     model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options,
                  max_episode_steps=max_episode_steps)
     spec = PlannerSpec(planner, planner_kwargs or {})
-    with _new_folder(out) as folder:
+    config = {"kind": "plan", "planner": spec.name, "seed": seed, **limits._asdict(),
+              "environment": model.spec.to_dict(), "planner_kwargs": spec.options, "versions": planning_versions()}
+    with _new_folder(out, config) as folder:
         recorder = TransitionRecorder(model) if coverage else None
         with quiet_ompl(), make_problem(model, seed=seed, counter=Counter(limits.max_transitions),
                                         recorder=recorder) as problem:
@@ -134,10 +137,27 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
             planner_settings=found.settings, trajectory=trajectory, tree=found.tree,
             coverage=None if recorder is None else recorder.coverage(found.tree, transitions, found.seconds))
         if folder is not None:
-            _write(folder, result, model, limits)
+            _write(folder, result, config)
     return result
 
 
+def read_plan(folder: str | Path) -> PlanResult:
+    """Return the result that a plan has left in a folder.
+
+    Raises:
+        DamagedFile: there is none, or a file is damaged.
+    """
+    path = Path(folder)
+    found = read_folder(path)
+    trajectory = Trajectory.load(path / TRAJECTORY) if (path / TRAJECTORY).exists() else None
+    try:
+        return PlanResult(**(found.result or {}), trajectory=trajectory, tree=load_tree(path / TREE),
+                          planner_settings=found.config.get("planner_kwargs", {}))
+    except TypeError as error:
+        raise DamagedFile(f"{path / RESULT} is not the result of a plan: {error}") from error
+
+
+PARTS = (TRAJECTORY, TREE)
 NOTHING_FOUND = Verification(False, None, "the budget ended before the goal was reached")
 
 
@@ -153,29 +173,27 @@ class _Found(NamedTuple):
 def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
             on_progress: ProgressCallback | None) -> _Found:
     setup, callbacks = problem.setup, problem.callbacks
-    planner = spec.build(problem.space_information, SeedTree(seed).child("planner").integer())
-    batch_planner = as_batch_planner(planner)
-    if batch_planner is not None:
-        batch_planner.use_model(problem.model, callbacks.counter)
-    setup.setPlanner(planner)
-    setup.setup()
+    with code_of_others(f"the planner {spec.name!r}"):
+        planner = spec.build(problem.space_information, SeedTree(seed).child("planner").integer())
+        batch_planner = as_batch_planner(planner)
+        if batch_planner is not None:
+            batch_planner.use_model(problem.model, callbacks.counter)
+        setup.setPlanner(planner)
+        setup.setup()
     stop = make_stop(callbacks, limits.max_seconds, on_progress)
     if callbacks.recorder is not None:
         stop = callbacks.recorder.timed(stop, callbacks.counter)
-    with interruptible(lambda: callbacks.fail(KeyboardInterrupt())):
+    with interruptible(callbacks.fail):
         began = time.perf_counter()
-        try:
+        with code_of_others():
             planner.solve(ob.PlannerTerminationCondition(stop))
-        except PbcsError:
-            raise
-        except Exception as error:
-            raise callback_failed(error) from error
         seconds = time.perf_counter() - began
     if batch_planner is not None:
         _keep_error(batch_planner, callbacks)
     callbacks.raise_error()
-    tree = tree_of(planner, problem.space_information)
-    return _Found(_solution(problem, spec, seed), tree, spec.settings(planner), seconds)
+    with code_of_others(f"the planner {spec.name!r}"):
+        tree = tree_of(planner, problem.space_information)
+        return _Found(_solution(problem, spec, seed), tree, spec.settings(planner), seconds)
 
 
 def _keep_error(planner: BatchPlanner, callbacks: CallbackState) -> None:
@@ -197,31 +215,29 @@ def _solution(problem: Problem, spec: PlannerSpec, seed: int) -> Trajectory | No
 
 
 @contextmanager
-def _new_folder(out: str | Path | None) -> Iterator[RunFolder | None]:
-    """Open the result folder; when the run fails, remove what it has written."""
+def _new_folder(out: str | Path | None, config: dict[str, Any]) -> Iterator[RunFolder | None]:
+    """Open the result folder, and write its settings; when the run fails, remove what it has written."""
     if out is None:
         yield None
         return
     existed = Path(out).exists()
-    with RunFolder(out) as folder:
+    with start_run(Path(out), config, may_change=("planner_kwargs", "versions"), parts=PARTS) as folder:
         try:
             yield folder
             return
         except BaseException:
-            for name in (TRAJECTORY, TREE, CONFIG, PROVENANCE, RESULT):
+            for name in (*PARTS, CONFIG, PROVENANCE, RESULT):
                 (folder.path / name).unlink(missing_ok=True)
             folder.close()
             if not existed:
-                folder.path.rmdir()
+                with suppress(OSError):  # somebody else has removed it, or put something there
+                    folder.path.rmdir()
             raise
 
 
-def _write(folder: RunFolder, result: PlanResult, model: ResettableModel, limits: Limits) -> None:
+def _write(folder: RunFolder, result: PlanResult, config: dict[str, Any]) -> None:
     if result.trajectory is not None:
         result.trajectory.save(folder.path / TRAJECTORY)
     save_tree(result.tree, folder.path / TREE)
-    folder.write_config({
-        "kind": "plan", "planner": result.planner, "seed": result.seed, **limits._asdict(),
-        "environment": model.spec.to_dict(), "planner_kwargs": result.planner_settings,
-        "versions": planning_versions()})
+    folder.write_config(config | {"planner_kwargs": result.planner_settings})
     folder.write_result(result.summary())

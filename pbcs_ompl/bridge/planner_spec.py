@@ -7,6 +7,7 @@ from typing import Any
 from ompl import base as ob
 
 from pbcs_ompl.core import registry
+from pbcs_ompl.core.callbacks import callback_failed, code_of_others, describe
 from pbcs_ompl.core.errors import InvalidOption, PbcsError
 from pbcs_ompl.core.interfaces import BatchPlanner, PlannerFactory
 from pbcs_ompl.core.options import check_names
@@ -35,6 +36,10 @@ class PlannerSpec:
         source = registry.load("planner", planner) if isinstance(planner, str) else planner
         self.name = planner if isinstance(planner, str) else _name_of(planner)
         self.options = dict(options)
+        with code_of_others(f"the planner {self.name!r}"):
+            self._read(source, options)
+
+    def _read(self, source: Any, options: dict[str, Any]) -> None:
         if isinstance(source, PlannerFactory):
             self._build: Callable[..., Any] = source.build
             self._seeded, self._defaults = True, source.options()
@@ -65,7 +70,9 @@ class PlannerSpec:
         except PbcsError:
             raise
         except (TypeError, ValueError) as error:
-            raise InvalidOption(f"planner {self.name!r} refused options {self.options}: {error}") from error
+            raise InvalidOption(f"planner {self.name!r} refused options {self.options}: {describe(error)}") from error
+        except (Exception, SystemExit) as error:
+            raise callback_failed(error, f"the planner {self.name!r}") from error
 
     def settings(self, planner: Any) -> dict[str, Any]:
         """Return every option with the value in use, once `planner`, which this spec built, has solved.

@@ -14,7 +14,7 @@ from ompl import control as oc
 
 from pbcs_ompl.bridge.coverage import TransitionRecorder
 from pbcs_ompl.bridge.spaces import make_control_space, make_state_space
-from pbcs_ompl.core.callbacks import callback_failed, check_finite
+from pbcs_ompl.core.callbacks import callback_failed, check_finite, code_of_others
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, InvalidState, PbcsError, UnsupportedSpace
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import Reader, Writer, quiet_ompl, seed_ompl, value_reader, value_writer
@@ -237,7 +237,8 @@ def make_problem(model: ResettableModel, *, counter: Counter, start: Array | Non
         UnsupportedSpace: the bounds of the environment are not finite.
     """
     _check_model(model)
-    first = _check_start(model, model.initial_state(seed) if start is None else start)
+    with code_of_others(f"the environment {model.spec.id!r}"):
+        first = _check_start(model, model.initial_state(seed) if start is None else start)
     with quiet_ompl():
         seed_ompl(seed)
         state_space = make_state_space(model)

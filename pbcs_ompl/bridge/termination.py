@@ -1,11 +1,8 @@
 """When a planner has to end: budget, time, a failed callback, Ctrl-C."""
 
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 from pbcs_ompl.bridge.problem import CallbackState
 from pbcs_ompl.core.errors import InvalidOption
@@ -57,26 +54,3 @@ def make_stop(callbacks: CallbackState, max_seconds: float | None,
         return callbacks.stopped or now >= deadline
 
     return stop
-
-
-@contextmanager
-def interruptible(on_interrupt: Callable[[], None]) -> Iterator[None]:
-    """Call `on_interrupt` at the first Ctrl-C instead of raising wherever the program happens to be.
-
-    A planner must not be left through OMPL's C++, a training only between two of its steps. A second Ctrl-C raises at
-    once. Handlers that a host application has set, and other threads, are left alone.
-    """
-    usual = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or usual is not signal.default_int_handler:
-        yield
-        return
-
-    def stop_once(number: int, frame: Any) -> None:
-        signal.signal(signal.SIGINT, usual)
-        on_interrupt()
-
-    signal.signal(signal.SIGINT, stop_once)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, usual)

@@ -14,8 +14,10 @@ from pbcs_ompl.core.ompl_access import path_control, value_reader
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap, Actions
+from pbcs_ompl.results.arrays import NUMBERS, take, take_words
 from pbcs_ompl.results.files import read_arrays, write_arrays
 from pbcs_ompl.results.provenance import environment_versions
+from pbcs_ompl.results.schema import TrajectoryWords, Versioned
 
 FORMAT = 3
 
@@ -67,8 +69,12 @@ class Trajectory:
                      actions=self.actions, rewards=self.rewards)
 
     @classmethod
-    def load(cls, path: str | Path) -> "Trajectory":
+    def load(cls, path: str | Path, *, trust: bool = False) -> "Trajectory":
         """Read what `save` has written.
+
+        Args:
+            path: The file.
+            trust: Let the environment be made from what the file says where that imports a module.
 
         Raises:
             DamagedFile: the file is missing, truncated, of another version, or not ours.
@@ -78,28 +84,20 @@ class Trajectory:
         missing = {"metadata", "states", "actions", "rewards"} - set(arrays)
         if missing:
             raise DamagedFile(f"{path} is not a trajectory: it lacks {', '.join(sorted(missing))}")
-        try:
-            words = json.loads(str(arrays["metadata"]))
-            version = words.pop("format")
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise DamagedFile(f"{path} is not a trajectory: its metadata do not parse ({error})") from error
+        version = take_words(path, arrays, "metadata", Versioned)["format"]
         if version != FORMAT:
             raise DamagedFile(f"{path} has format {version}, this version of pbcs_ompl reads format {FORMAT}: "
                               "plan again, or install the version that wrote it")
-        return cls._checked(path, words, arrays)
-
-    @classmethod
-    def _checked(cls, path: Path, words: dict[str, Any], arrays: dict[str, np.ndarray]) -> "Trajectory":
-        states, actions, rewards = arrays["states"], arrays["actions"], arrays["rewards"]
-        steps = len(rewards) if rewards.ndim else -1
-        if states.ndim != 2 or actions.ndim not in (1, 2) or len(states) != steps + 1 or len(actions) != steps:
-            raise DamagedFile(f"{path} is damaged: states {states.shape}, actions {actions.shape}, rewards "
-                              f"{rewards.shape}; expected [T+1, D], [T, ...], [T]")
-        try:
-            environment = EnvSpec.from_dict(words.pop("environment"))
-            return cls(environment, states=states, actions=actions, rewards=rewards, **words)
-        except (KeyError, TypeError) as error:
-            raise DamagedFile(f"{path} is not a trajectory: {error}") from error
+        words = take_words(path, arrays, "metadata", TrajectoryWords)
+        unknown = words.keys() - TrajectoryWords.__annotations__.keys() - Versioned.__annotations__.keys()
+        if unknown:
+            raise DamagedFile(f"{path} is not a trajectory of this version: it has {', '.join(sorted(unknown))}")
+        rewards = take(path, arrays, "rewards", (None,), kinds=NUMBERS, finite=False)
+        states = take(path, arrays, "states", (len(rewards) + 1, None), finite=False)
+        actions = take(path, arrays, "actions", (len(rewards), *arrays["actions"].shape[1:2]), kinds=NUMBERS,
+                       finite=False)
+        return cls(EnvSpec.from_dict(words["environment"], trusted=trust), states, actions, rewards, words["planner"],
+                   words["seed"], words["reset_seed"], words["versions"])
 
     def replay(self, model: ResettableModel) -> Array:
         """Return the states [T+1, D] that the actions lead to.

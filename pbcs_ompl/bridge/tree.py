@@ -11,6 +11,7 @@ from pbcs_ompl.bridge.planner_spec import as_batch_planner
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.ompl_access import real_dimension, value_reader
 from pbcs_ompl.core.tree import Tree
+from pbcs_ompl.results.arrays import INTEGERS, take
 from pbcs_ompl.results.files import read_arrays, write_arrays
 
 
@@ -51,7 +52,11 @@ def load_tree(path: str | Path) -> Tree:
     Raises:
         DamagedFile: the file is missing, truncated, or not a tree.
     """
-    arrays = read_arrays(Path(path))
-    if not {"states", "parents"} <= set(arrays) or arrays["states"].shape[:1] != arrays["parents"].shape:
-        raise DamagedFile(f"{path} is not a tree: expected states [N, D] and parents [N]")
-    return Tree.from_arrays(arrays["states"], arrays["parents"], arrays.get("controls"))
+    path = Path(path)
+    arrays = read_arrays(path)
+    states = take(path, arrays, "states", (None, None), finite=False)
+    parents = take(path, arrays, "parents", (len(states),), kinds=INTEGERS)
+    if len(parents) and not -1 <= parents.min() <= parents.max() < len(states):
+        raise DamagedFile(f"{path} is damaged: parents are nodes 0 to {len(states) - 1}, or -1")
+    controls = take(path, arrays, "controls", (len(states), None), finite=False) if "controls" in arrays else None
+    return Tree.from_arrays(states, parents, controls)

@@ -1,25 +1,31 @@
 """The command line: parse, call, print. Each verb is one file of this package, imported when it is used.
 
 Exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed,
-130 interrupted.
+4 a mistake in pbcs itself, 128+n stopped by signal n (130 for Ctrl-C, 141 for a pipe that was closed).
 """
 
 import sys
 import traceback
 import warnings
+from argparse import Namespace
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
 from pbcs_ompl.cli.arguments import build_parser, parse
+from pbcs_ompl.cli.streams import OutputClosed, flush_output, print_error, survive_encodings
 from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.formatting import one_line
+from pbcs_ompl.core.signals import signal_of, signals_interrupt
+from pbcs_ompl.core.trust import module_names
+
+WRONG_INPUT, OUR_MISTAKE, STOPPED, SIGPIPE = 2, 4, 128, 13
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status. Each mistake of the user, and each warning, is one line on stderr."""
     words = list(sys.argv[1:] if argv is None else argv)
-    if "" not in sys.path:
-        sys.path.append("")  # `--planner my_module:MyPlanner` finds a module in the working directory
+    survive_encodings()
     with warnings.catch_warnings():
         warnings.showwarning = _warn
         return _run(words)
@@ -27,22 +33,48 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(words: list[str]) -> int:
     try:
-        arguments = parse(build_parser(), words)
-        return int(import_module(f"pbcs_ompl.cli.{arguments.verb}").run(arguments))
+        with signals_interrupt():
+            status = _dispatch(words)
+            flush_output()
+            return status
     except PbcsError as error:
         return _complain(error, f"error: {error}", error.exit_code)
     except KeyboardInterrupt as error:
         remedy = str(error) or "run the same command again to start over"
-        return _complain(error, f"interrupted; {remedy}", 130)
+        return _complain(error, f"interrupted; {remedy}", STOPPED + signal_of(error))
+    except OutputClosed:
+        return STOPPED + SIGPIPE
+    except MemoryError as error:
+        return _complain(error, f"error: out of memory; {error}", WRONG_INPUT)
+    except Exception as error:
+        print_error(traceback.format_exc().rstrip())
+        return _complain(error, "error: this is a mistake in pbcs; please report it with the lines above", OUR_MISTAKE)
+
+
+def _dispatch(words: list[str]) -> int:
+    """Parse and run a command; only the parser may end it, after --help and --version."""
+    arguments = parse(build_parser(), words)
+    if _imports(arguments) and "" not in sys.path:
+        sys.path.append("")  # `--planner my_module:MyPlanner` finds a module in the working directory
+    try:
+        return int(import_module(f"pbcs_ompl.cli.{arguments.verb}").run(arguments))
+    except SystemExit as error:
+        raise PbcsError(f"code that pbcs {arguments.verb} has called left with sys.exit({error.code!r})") from error
+
+
+def _imports(arguments: Namespace) -> bool:
+    """Return whether a command imports what the user has: else nothing in the working directory is imported."""
+    return (arguments.verb == "study" or getattr(arguments, "trust", False)
+            or any(module_names(list(vars(arguments).values()))))
 
 
 def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
-    print("pbcs: warning:", " ".join(str(message).split()), file=sys.stderr)
+    print_error(f"pbcs: warning: {one_line(str(message))}")
 
 
 def _complain(error: BaseException, message: str, status: int) -> int:
     """Print one line, and let go of what the failed call held: OMPL's bindings list it as leaked at exit."""
-    print("pbcs:", " ".join(message.split()), file=sys.stderr)
+    print_error(f"pbcs: {one_line(message)}")
     link: BaseException | None = error
     while link is not None:
         traceback.clear_frames(link.__traceback__)

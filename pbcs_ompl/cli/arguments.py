@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
+from pbcs_ompl.cli.streams import print_output
 from pbcs_ompl.cli.values import choice, fraction, integer, json_object, part, seconds
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
@@ -21,7 +22,8 @@ examples:
   pbcs compare --planners Ex RRTNH EST KPIECE1 --env pbcs/Maze-v0 --env-kwargs '{"size": 9}' --seeds 10
   pbcs report runs
 
-exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed
+exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed, 4 a mistake in pbcs,
+128+n stopped by signal n; after SIGTERM and SIGHUP as after Ctrl-C, a training can be resumed
 """
 ON_A_CLUSTER = """\
 on a cluster:
@@ -46,6 +48,9 @@ class Parser(argparse.ArgumentParser):
         self.options += [name for name in names if name.startswith("-")]
         return super().add_argument(*names, **settings)
 
+    def print_help(self, file: Any = None) -> None:
+        print_output(self.format_help().rstrip())
+
     def error(self, message: str) -> NoReturn:
         raise InvalidOption(f"{message} (see {self.prog} --help)")
 
@@ -56,7 +61,7 @@ class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
         from pbcs_ompl import __version__
 
-        print(f"pbcs {__version__}")
+        print_output(f"pbcs {__version__}")
         parser.exit()
 
 
@@ -147,6 +152,7 @@ def _train(verb: Parser) -> None:
                       help="stop after N environment steps (10,000,000)")
     _add_out(verb)
     verb.add_argument("--resume", metavar="DIR", help="continue a training that was stopped")
+    _add_trust(verb, "the folder of --resume")
 
 
 def _eval(verb: Parser) -> None:
@@ -157,6 +163,7 @@ def _eval(verb: Parser) -> None:
                       help="probability of a random action in each step (0)")
     verb.add_argument("--video", metavar="FILE", help="film the first rollout; .mp4 or .gif")
     verb.add_argument("--out", metavar="DIR", help="new folder for the numbers, which pbcs report shows (none)")
+    _add_trust(verb, "the folder")
 
 
 def _compare(verb: Parser) -> None:
@@ -234,6 +241,11 @@ def _add_seed(verb: Parser) -> None:
 def _add_budget(verb: Parser, default: int) -> None:
     verb.add_argument("--max-transitions", type=integer(1), default=default, metavar="N",
                       help=f"stop after N environment steps ({default:,})")
+
+
+def _add_trust(verb: Parser, source: str) -> None:
+    verb.add_argument("--trust", action="store_true",
+                      help=f"run the code of the modules that {source} names; only for folders of people you trust")
 
 
 def _add_out(verb: Parser) -> None:

@@ -11,8 +11,9 @@ from pbcs_ompl.cli.pictures import draw_comparison
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
 from pbcs_ompl.core.formatting import format_duration, format_number
+from pbcs_ompl.core.signals import with_remedy
 from pbcs_ompl.experiments.compare import compare
-from pbcs_ompl.results.command_line import command, report_words
+from pbcs_ompl.results.command_line import command, report_words, shell
 
 HEADER = f"{'solved':<10}{'95 % interval':<17}{'transitions':<15}{'seconds':<10}(medians)"
 
@@ -28,8 +29,8 @@ def run(arguments: Namespace) -> int:
                                  feature=arguments.feature, start_seed=arguments.start_seed, seeds=arguments.seeds,
                                  max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds,
                                  max_memory=arguments.max_memory, jobs=jobs, out=out, on_progress=display)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"continue with the same command and --out {out}") from None
+    except KeyboardInterrupt as error:
+        raise with_remedy(error, f"continue with the same command and --out {shell(str(out))}") from None
     draw_comparison(comparison, f"{arguments.seeds} seeds", out)
     summary = comparison.summary()
     print_summary(summary, _closing_lines(summary, out), as_json=arguments.json)
@@ -63,7 +64,7 @@ def _closing_lines(summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
         lines += [("pair", _pair(test)) for test in summary["tests"] if test["environment"] == place]
     return [*lines, ("files", list_files(out)),
             ("next", command(report_words(out))),
-            ("", f"DATABASE={summary['database']} plannerarena   (pip install 'pbcs-ompl[arena]')")]
+            ("", f"DATABASE={shell(str(summary['database']))} plannerarena   (pip install 'pbcs-ompl[arena]')")]
 
 
 def _cells(row: dict[str, Any]) -> str:

@@ -19,18 +19,18 @@ from pbcs_ompl.skills.evaluation import evaluate
 def run(arguments: Namespace) -> int:
     """Evaluate and report. Returns 1 when no rollout reached the goal."""
     folder = Path(arguments.dir)
-    chain = SkillChain.load(folder / CHAIN if (folder / CHAIN).is_dir() else folder)
-    model = make(chain.environment)
+    chain = SkillChain.load(folder / CHAIN if (folder / CHAIN).is_dir() else folder, trust=arguments.trust)
     if arguments.video:
         check_video(arguments.video)
     with nullcontext() if arguments.out is None else RunFolder(arguments.out) as out:
-        evaluation = evaluate(chain, model, episodes=arguments.episodes, epsilon=arguments.epsilon)
+        evaluation = evaluate(chain, episodes=arguments.episodes, epsilon=arguments.epsilon)
         summary = evaluation.summary()
         if out is not None:
             out.write_config({"kind": "eval", "chain": folder, "episodes": arguments.episodes,
                               "epsilon": arguments.epsilon, "environment": chain.environment.to_dict()})
             out.write_result(summary)
     if arguments.video:
+        model = make(chain.environment)
         write_video(model, chain.rollout(model, epsilon=arguments.epsilon), arguments.video)
         summary["video"] = arguments.video
     print_summary(summary, _closing_lines(arguments, summary), as_json=arguments.json)
@@ -40,11 +40,14 @@ def run(arguments: Namespace) -> int:
 def _closing_lines(arguments: Namespace, summary: dict[str, Any]) -> list[tuple[str, str]]:
     noise = f", {arguments.epsilon:.0%} random actions" if arguments.epsilon else ""
     lines = [("success", format_rate(summary["success_rate"], summary["wilson"])),
-             ("rollouts", f"{summary['episodes']} from the start{noise}")]
+             ("rollouts", f"{summary['episodes']} from the start{noise}, in fresh environments")]
+    failures = {ending: count for ending, count in summary["endings"].items() if ending != "goal"}
+    if failures:
+        lines.append(("failed", ", ".join(f"{count} by {ending}" for ending, count in failures.items())))
     if summary["steps_median"] is not None:
         lines.append(("steps", f"{format_number(summary['steps_median'])} to the goal, median"))
     if arguments.video:
         lines.append(("video", arguments.video))
     if not arguments.epsilon:
-        lines.append(("next", command(eval_words(arguments.dir, epsilon=0.1))))
+        lines.append(("next", command(eval_words(arguments.dir, epsilon=0.1, trust=arguments.trust))))
     return lines

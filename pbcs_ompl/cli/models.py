@@ -1,11 +1,12 @@
 """What a model can do and is asked to do, in words."""
 
-import sys
 from typing import Any
 
+from pbcs_ompl.cli.streams import print_error
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.feature_bounds import narrow_words
 
 
 def describe(model: ResettableModel) -> dict[str, Any]:
@@ -19,7 +20,9 @@ def feature_words(model: ResettableModel) -> str:
     """Return what is explored, within which bounds, and where these come from."""
     env = model.env
     rule = model.spec.feature or "the adapter's choice"
-    source = f", from {env.bounds_from}" if isinstance(env, RestorableEnv) else ""
+    source = ""
+    if isinstance(env, RestorableEnv):
+        source = f", from {env.bounds.source}" + (f"; {narrow_words(env.bounds)}" if env.bounds.narrow else "")
     return f"{rule}: {_vector(model.feature_low)} to {_vector(model.feature_high)}{source}"
 
 
@@ -32,7 +35,7 @@ def goal_words(model: ResettableModel) -> str:
 def note_rules(model: ResettableModel) -> None:
     """Print on stderr what is explored and what is a success where an adapter, not the environment, decides it."""
     if isinstance(model.env, RestorableEnv):
-        print(f"feature   {feature_words(model)}\ngoal      {goal_words(model)}", file=sys.stderr)
+        print_error(f"feature   {feature_words(model)}", f"goal      {goal_words(model)}")
 
 
 def _vector(values: Array) -> str:

@@ -5,32 +5,38 @@ from pathlib import Path
 
 from pbcs_ompl.bridge.plan import PlanResult, plan
 from pbcs_ompl.cli.arguments import environment
+from pbcs_ompl.cli.finished import finished_plan
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.models import note_rules
 from pbcs_ompl.cli.pictures import draw_tree
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.formatting import format_duration, format_number
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, environment_words
 
 
 def run(arguments: Namespace) -> int:
-    """Plan, draw, report. Returns 1 when the goal was not reached within the budget."""
+    """Plan, draw, report. Returns 1 when the environment does not grant the goal to a plan."""
     out = Path(arguments.out or fresh_folder("plan", arguments.env, arguments.planner, arguments.seed))
     model = make(environment(arguments))
     note_rules(model)
     if arguments.video:
         check_video(arguments.video)
-    with ProgressDisplay("plan", budget=arguments.max_transitions, max_seconds=arguments.max_seconds) as display:
-        result = plan(model, arguments.planner, planner_kwargs=arguments.planner_kwargs, seed=arguments.seed,
-                      max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds, out=out,
-                      on_progress=display)
+    result = finished_plan(arguments, out) or _plan(arguments, model, out)
     draw_tree(model, result, out)
     if arguments.video and result.trajectory is not None:
         write_video(model, result.trajectory.states, arguments.video)
     print_summary(result.summary(), _closing_lines(arguments, result, out), as_json=arguments.json)
     return 0 if result.solved else 1
+
+
+def _plan(arguments: Namespace, model: ResettableModel, out: Path) -> PlanResult:
+    with ProgressDisplay("plan", budget=arguments.max_transitions, max_seconds=arguments.max_seconds) as display:
+        return plan(model, arguments.planner, planner_kwargs=arguments.planner_kwargs, seed=arguments.seed,
+                    max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds, out=out,
+                    on_progress=display)
 
 
 def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[tuple[str, str]]:
@@ -39,10 +45,12 @@ def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[
               f"({rate} transitions/s)")
     lines = [("solved" if result.solved else "not solved", effort), ("tree", f"{format_number(result.nodes)} nodes")]
     if result.solved:
-        replay = "replays exactly" if result.replay_ok else "DOES NOT REPLAY (not deterministic?)"
-        lines.append(("path", f"{format_number(result.path_length)} steps, {replay}"))
+        lines.append(("path", f"{format_number(result.path_length)} steps, verified in a fresh environment"))
         words = environment_words(environment(arguments))
         following = command(["train", *words, "--path", str(out)])
+    elif result.found:
+        lines.append(("FAILED", str(result.reason)))
+        following = command(["doctor", *environment_words(environment(arguments))])
     else:
         following = "the same with a larger --max-transitions or --max-seconds, or another --planner"
     return [*lines, ("files", list_files(out)), ("next", following)]

@@ -10,12 +10,13 @@ from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import format_value
+from pbcs_ompl.core.signals import with_remedy
 from pbcs_ompl.experiments.records import record_file
 from pbcs_ompl.experiments.run import Shard
 from pbcs_ompl.experiments.run_study import open_study, run_shard, run_study
 from pbcs_ompl.experiments.study import Study, find_study, study_ids
 from pbcs_ompl.experiments.workers.schedulers import makefile, slurm_script
-from pbcs_ompl.results.command_line import command, report_words, study_words
+from pbcs_ompl.results.command_line import command, report_words, shell, study_words
 from pbcs_ompl.results.files import write_text
 
 VERDICTS = {True: "agrees", False: "DIFFERS", None: "no data"}
@@ -41,8 +42,8 @@ def run(arguments: Namespace) -> int:
         return _emit(study, arguments, out)
     try:
         return _make(study, arguments, out)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"continue with the same command and --out {out}") from None
+    except KeyboardInterrupt as error:
+        raise with_remedy(error, f"continue with the same command and --out {shell(str(out))}") from None
 
 
 def _make(study: Study, arguments: Namespace, out: Path) -> int:
@@ -73,14 +74,14 @@ def _emit(study: Study, arguments: Namespace, out: Path) -> int:
     whole = [sys.executable, "-m", "pbcs_ompl.cli", *words, "--out", str(out.resolve()),
              *(word for option, limit in limits if limit is not None for word in (option, f"{limit:g}"))]
     runs = study.all_runs(arguments.seeds)
+    if arguments.emit == "make":
+        file, following = out / "Makefile", shell("make", "-C", str(out), "--jobs", "2", "--keep-going")
+        text = makefile(whole, [str(record_file(out, run.name).relative_to(out)) for run in runs])
+    else:
+        file, following = out / "slurm.sh", shell("sbatch", str(out / "slurm.sh"))
+        text = slurm_script(whole, len(runs), study.id, out.resolve())
     with open_study(study, out, arguments.seeds):
-        if arguments.emit == "make":
-            file, following = out / "Makefile", f"make -C {out} --jobs 2 --keep-going"
-            records = [str(record_file(out, run.name).relative_to(out)) for run in runs]
-            write_text(file, makefile(whole, records))
-        else:
-            file, following = out / "slurm.sh", f"sbatch {out / 'slurm.sh'}"
-            write_text(file, slurm_script(whole, len(runs), study.id, out.resolve()))
+        write_text(file, text)
     print_summary({"id": study.id, "runs": len(runs), "out": str(out), "file": str(file)},
                   [(study.id, f"{len(runs)} runs in {file}"), ("next", following)], as_json=arguments.json)
     return 0

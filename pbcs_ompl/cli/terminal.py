@@ -1,9 +1,9 @@
 """What a human sees: progress with rates, a closing summary; and what a script reads: one JSON line."""
 
 import json
-import sys
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,8 @@ from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from pbcs_ompl.core.formatting import format_duration, format_number
+from pbcs_ompl.cli.streams import print_error, print_output
+from pbcs_ompl.core.formatting import format_duration, format_number, one_line, printable
 from pbcs_ompl.core.plain import plain
 
 SECONDS_BETWEEN_LINES = 10.0
@@ -58,7 +59,8 @@ class ProgressDisplay:
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:
-            self._bar.stop()
+            with suppress(OSError):  # the terminal is gone
+                self._bar.stop()
 
     def __call__(self, numbers: dict[str, Any]) -> None:
         now = time.monotonic()
@@ -73,7 +75,7 @@ class ProgressDisplay:
             self._last_line = now
             rows = ("  " + ", ".join(f"{name} {format_number(value)}" for name, value in row.items())
                     for row in numbers.get("table", []))
-            print(text, *rows, sep="\n", file=sys.stderr, flush=True)
+            print_error(*map(printable, [text, *rows]))
 
     def _share(self, numbers: dict[str, Any], seconds: float) -> float | None:
         """Return the share that is done, in [0, 1]; None if unknown."""
@@ -108,17 +110,15 @@ def _table(rows: Sequence[dict[str, Any]]) -> Table | None:
 
 def print_summary(result: dict[str, Any], lines: Sequence[tuple[str, str]], *, as_json: bool) -> None:
     """Print the closing summary, and the JSON object as the last line on stdout if it was asked for."""
-    stream = sys.stderr if as_json else sys.stdout
-    for name, text in lines:
-        print(f"{name:<9} {text}", file=stream)
+    show = print_error if as_json else print_output
+    show(*(printable(f"{name:<9} {text}") for name, text in lines))
     if as_json:
-        stream.flush()
-        print(json.dumps(result, default=plain), flush=True)
+        print_output(json.dumps(result, default=plain))
 
 
 def warn(message: str) -> None:
     """Print one line on stderr."""
-    print("pbcs:", " ".join(message.split()), file=sys.stderr)
+    print_error(f"pbcs: {one_line(message)}")
 
 
 def list_files(folder: Path) -> str:

@@ -2,18 +2,23 @@
 
 from argparse import Namespace
 from pathlib import Path
+from typing import Any
 
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.cli.arguments import build_parser, environment
+from pbcs_ompl.cli.finished import lacks_picture_only
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.pictures import draw_chain
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary, warn
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import format_duration, format_number, format_rate
+from pbcs_ompl.core.signals import with_remedy
+from pbcs_ompl.core.trust import module_names
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words, resume_words
-from pbcs_ompl.results.files import CONFIG, TRAJECTORY
-from pbcs_ompl.skills import TrainResult, resume, train
+from pbcs_ompl.results.files import CHAIN, CONFIG, TRAJECTORY
+from pbcs_ompl.results.folder import RunFolder, read_folder
+from pbcs_ompl.skills import SkillChain, TrainResult, resume, train
 
 
 def run(arguments: Namespace) -> int:
@@ -21,20 +26,23 @@ def run(arguments: Namespace) -> int:
     if arguments.resume:
         _refuse_other_options(arguments)
         out = Path(arguments.resume)
+        if lacks_picture_only(out):
+            return _draw_only(out, as_json=arguments.json)
     else:
         if arguments.env is None:
             raise InvalidOption("--env is missing (see pbcs train --help)")
         out = Path(arguments.out or fresh_folder("train", arguments.env, arguments.method, arguments.seed))
     try:
         result = _train(arguments, out)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         if (out / CONFIG).is_file():
-            raise KeyboardInterrupt(f"continue with: {command(resume_words(out))}") from None
+            again = command(resume_words(out, trust=_names_modules(arguments)))
+            raise with_remedy(error, f"continue with: {again}") from None
         raise
     if result.reason is not None:
         warn(result.reason)
-    _draw(result, out)
-    print_summary(result.summary(), _closing_lines(result, out), as_json=arguments.json)
+    _draw(result.summary(), result.chain, result.trajectory, out)
+    print_summary(result.summary(), _closing_lines(arguments, result, out), as_json=arguments.json)
     return 0 if result.solved else 1
 
 
@@ -42,7 +50,7 @@ def _train(arguments: Namespace, out: Path) -> TrainResult:
     budget = {} if arguments.max_transitions is None else {"max_transitions": arguments.max_transitions}
     with ProgressDisplay("train", budget=arguments.max_transitions) as display:
         if arguments.resume:
-            return resume(out, on_progress=display, **budget)
+            return resume(out, trust=arguments.trust, on_progress=display, **budget)
         trajectory = None if arguments.path is None else _read_trajectory(Path(arguments.path))
         return train(environment(arguments), trajectory=trajectory, out=out,
                      method=arguments.method, planner=arguments.planner, planner_kwargs=arguments.planner_kwargs,
@@ -55,7 +63,7 @@ def _refuse_other_options(arguments: Namespace) -> None:
     """A resumed run has the settings of its folder; only its budget may change."""
     defaults = vars(build_parser().parse_args(["train"]))
     for name, value in vars(arguments).items():
-        if name not in ("resume", "json", "max_transitions") and value != defaults[name]:
+        if name not in ("resume", "trust", "json", "max_transitions") and value != defaults[name]:
             raise InvalidOption(f"--resume takes every setting but --max-transitions from "
                                 f"{arguments.resume}; remove --{name.replace('_', '-')}")
 
@@ -64,18 +72,34 @@ def _read_trajectory(path: Path) -> Trajectory:
     return Trajectory.load(path / TRAJECTORY if path.is_dir() else path)
 
 
-def _draw(result: TrainResult, out: Path) -> None:
-    if result.chain is None:
+def _draw_only(out: Path, *, as_json: bool) -> int:
+    """Make the picture of a training that was killed after its result."""
+    with RunFolder(out, resume=True):
+        result = read_folder(out).result or {}
+        chain = SkillChain.load(out / CHAIN) if (out / CHAIN).is_dir() else None
+        trajectory = Trajectory.load(out / TRAJECTORY) if (out / TRAJECTORY).exists() else None
+        _draw(result, chain, trajectory, out)
+    print_summary(result, [("solved" if result["solved"] else "not solved", "ended before; its picture is made now"),
+                           ("files", list_files(out))], as_json=as_json)
+    return 0 if result["solved"] else 1
+
+
+def _draw(result: dict[str, Any], chain: SkillChain | None, trajectory: Trajectory | None, out: Path) -> None:
+    if chain is None:
         return
-    model = make(result.chain.environment)
-    trajectory = None if result.trajectory is None else result.trajectory.states
-    rollout = result.chain.rollout(model) if result.complete else None
-    title = (f"{model.spec.id}: {len(result.chain.skills)} skills, "
-             f"{result.train_transitions:,} transitions, {result.updates:,} updates")
-    draw_chain(model, result.chain, trajectory, rollout, title, out)
+    model = make(chain.environment)
+    rollout = chain.rollout(model) if result["complete"] else None
+    title = (f"{model.spec.id}: {len(chain.skills)} skills, "
+             f"{result['train_transitions']:,} transitions, {result['updates']:,} updates")
+    draw_chain(model, chain, None if trajectory is None else trajectory.states, rollout, title, out)
 
 
-def _closing_lines(result: TrainResult, out: Path) -> list[tuple[str, str]]:
+def _names_modules(arguments: Namespace) -> bool:
+    """Return whether a folder of this command names modules, so that reading it takes --trust."""
+    return arguments.trust or any(module_names(list(vars(arguments).values())))
+
+
+def _closing_lines(arguments: Namespace, result: TrainResult, out: Path) -> list[tuple[str, str]]:
     effort = (f"{format_number(result.plan_transitions)} transitions of planning, "
               f"{format_number(result.train_transitions)} of training, {format_number(result.updates)} updates, "
               f"{format_duration(result.seconds)}")
@@ -86,8 +110,11 @@ def _closing_lines(result: TrainResult, out: Path) -> list[tuple[str, str]]:
         lines.append(("rollout", f"{format_number(result.nominal.steps_median)} steps to the goal without noise"))
     if result.robust is not None:
         rate = format_rate(result.robust.success_rate, result.robust.wilson)
-        lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions"))
+        lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions, in fresh environments"))
     lines.append(("files", list_files(out)))
+    if result.complete and result.chain is None:
+        return lines
+    trust = _names_modules(arguments)
     if result.complete:
-        return [*lines, ("next", command(eval_words(out, epsilon=0.2)))]
-    return [*lines, ("next", f"{command(resume_words(out))} --max-transitions N, with a larger N")]
+        return [*lines, ("next", command(eval_words(out, epsilon=0.2, trust=trust)))]
+    return [*lines, ("next", f"{command(resume_words(out, trust=trust))} --max-transitions N, with a larger N")]

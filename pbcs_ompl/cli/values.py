@@ -1,12 +1,12 @@
 """How the words after an option become values. Each raises argparse's own error, which names the option."""
 
-import json
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Iterable
 from math import isfinite
 from typing import Any
 
 from pbcs_ompl.core.errors import did_you_mean
+from pbcs_ompl.core.text_values import parse_json, shortened
 
 EXPECTED_OBJECT = "expected a JSON object such as '{\"size\": 5}'"
 
@@ -68,9 +68,9 @@ def part(text: str) -> tuple[int, int]:
 def json_object(text: str) -> dict[str, Any]:
     """Read a JSON object."""
     try:
-        value = json.loads(text)
+        value = parse_json(text)
     except ValueError as error:
-        raise ArgumentTypeError(f"{EXPECTED_OBJECT}, got {text!r}: {error}") from error
+        raise ArgumentTypeError(f"{EXPECTED_OBJECT}, got {shortened(text)!r}: {error}") from error
     if not isinstance(value, dict):
-        raise ArgumentTypeError(f"{EXPECTED_OBJECT}, got {text!r}")
+        raise ArgumentTypeError(f"{EXPECTED_OBJECT}, got {shortened(text)!r}")
     return value

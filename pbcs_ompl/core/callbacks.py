@@ -1,15 +1,44 @@
-"""What a user's callbacks may return or raise: finite states, and exceptions that become one named error."""
+"""What code of others may return or raise: finite states, and exceptions that become one named error."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
-from pbcs_ompl.core.errors import CallbackFailed
+from pbcs_ompl.core.errors import CallbackFailed, PbcsError
 from pbcs_ompl.core.types import Array
+
+
+def describe(error: BaseException) -> str:
+    """Return the type and the message of an exception as one line, even where its message cannot be read."""
+    try:
+        text = " ".join(str(error).split()) or "no message"
+    except Exception as second:  # its __str__ is code of others, too
+        text = f"its message cannot be read: {type(second).__name__}"
+    return f"{type(error).__name__}: {text}"
 
 
 def callback_failed(error: BaseException, source: str = "the environment, goal or planner") -> CallbackFailed:
     """Return the one-line error for an exception of a user's code; raise it `from` that exception."""
-    text = " ".join(str(error).split()) or "no message"
-    return CallbackFailed(f"{source} raised {type(error).__name__}: {text}")
+    return CallbackFailed(f"{source} raised {describe(error)}")
+
+
+@contextmanager
+def code_of_others(source: str = "the environment, goal or planner") -> Iterator[None]:
+    """Turn whatever the code of others raises, `sys.exit` too, into one named error; our own errors and Ctrl-C pass.
+
+    Args:
+        source: Whose code it is, as in "the environment 'Reacher-v5'".
+
+    Raises:
+        CallbackFailed: names the exception, which is chained.
+    """
+    try:
+        yield
+    except PbcsError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise callback_failed(error, source) from error
 
 
 def check_finite(before: Array, controls: Array, after: Array) -> None:

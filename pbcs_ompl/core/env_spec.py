@@ -1,11 +1,27 @@
 """The task as one object: which environment, what a success is, what planners explore, where episodes start."""
 
 import json
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Collection
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, NotRequired, TypedDict
+
+import msgspec
 
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption
 from pbcs_ompl.core.plain import plain
+from pbcs_ompl.core.trust import is_module_name, module_names, refuse_modules
+
+
+class EnvValues(TypedDict):
+    """An `EnvSpec` as files hold it."""
+
+    id: Annotated[str, msgspec.Meta(min_length=1)]
+    kwargs: NotRequired[dict[str, Any]]
+    goal: NotRequired[str]
+    feature: NotRequired[str]
+    start_seed: NotRequired[Annotated[int, msgspec.Meta(ge=0)]]
+    reset_options: NotRequired[dict[str, Any]]
+    max_episode_steps: NotRequired[Annotated[int, msgspec.Meta(ge=1)]]
 
 
 @dataclass(frozen=True)
@@ -20,6 +36,7 @@ class EnvSpec:
         start_seed: Every episode starts as `reset(seed=start_seed)` does; None where each has a seed of its own.
         reset_options: What every reset gets as `options`; None for nothing.
         max_episode_steps: Steps after which an episode is cut off; None for the limit that the id is registered with.
+        trusted: Whether modules that it names may be imported: they were typed by the user, not read from a file.
 
     Raises:
         InvalidOption: `start_seed` is no integer >= 0, `max_episode_steps` none >= 1, or `reset_options` no dictionary.
@@ -32,6 +49,7 @@ class EnvSpec:
     start_seed: int | None = None
     reset_options: dict[str, Any] | None = None
     max_episode_steps: int | None = None
+    trusted: bool = field(default=True, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         _check_integer("start_seed", self.start_seed, 0)
@@ -58,16 +76,44 @@ class EnvSpec:
         kwargs = json.loads(json.dumps(self.kwargs, default=plain))
         return {"id": self.id, "kwargs": kwargs, **{name: rule for name, rule in rules.items() if rule is not None}}
 
+    @property
+    def modules(self) -> list[str]:
+        """The names in it that import a module when the environment is made."""
+        direct = [name for name in (self.id, self.goal, self.feature) if name is not None and is_module_name(name)]
+        return [*direct, *module_names([self.kwargs, self.reset_options])]
+
+    def check_trusted(self, known: Collection[str] = ()) -> None:
+        """Refuse to import what a file names.
+
+        Args:
+            known: Names that import nothing, because that has happened.
+
+        Raises:
+            UntrustedModule: the spec was read from a file, and names a module.
+        """
+        if not self.trusted:
+            refuse_modules(f"a file with the environment {self.label}",
+                           (name for name in self.modules if name not in known))
+
+    def as_trusted(self) -> "EnvSpec":
+        """Return the same spec, whose modules may be imported."""
+        return replace(self, trusted=True)
+
     @classmethod
-    def from_dict(cls, values: Any) -> "EnvSpec":
+    def from_dict(cls, values: Any, *, trusted: bool = False) -> "EnvSpec":
         """Return the spec whose `to_dict` this was.
+
+        Args:
+            values: From a file, or from another process.
+            trusted: Whether modules that it names may be imported.
 
         Raises:
             DamagedFile: it was none.
         """
         try:
-            return cls(**values)
-        except (TypeError, InvalidOption) as error:
+            msgspec.convert(values, EnvValues)
+            return cls(**values, trusted=trusted)
+        except (TypeError, InvalidOption, msgspec.ValidationError) as error:
             raise DamagedFile(f"the environment {values!r} is damaged: {error}") from error
 
     def same_as(self, other: "EnvSpec") -> bool:

@@ -51,6 +51,10 @@ class NotVerified(PbcsError):
     """What a planner or a trainer believes cannot be tried in a fresh environment, so nothing is called solved."""
 
 
+class BudgetUsedUp(PbcsError):
+    """More transitions were asked for than are left of a budget. Ends a training; users do not meet it."""
+
+
 class PlannerUnavailable(PbcsError):
     """A planner that the installed OMPL cannot build from Python."""
 
@@ -69,6 +73,10 @@ class CallbackFailed(PbcsError):
 
 class DamagedFile(PbcsError):
     """A file that is truncated, of another version, or not ours."""
+
+
+class UntrustedModule(PbcsError):
+    """A file names a module that would be imported; files of others are data, until the user says otherwise."""
 
 
 class Mismatch(PbcsError):

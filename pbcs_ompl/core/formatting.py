@@ -2,6 +2,28 @@
 
 from collections.abc import Iterable, Sequence
 from typing import Any
+from unicodedata import category
+
+HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
+"""Categories of Unicode that a terminal obeys instead of showing them: controls, directions, line ends."""
+
+
+def is_printable(text: str) -> bool:
+    """Return whether a terminal shows every character of a text, and obeys none."""
+    return text.isprintable() or not any(category(letter) in HIDDEN for letter in text)
+
+
+def printable(text: str) -> str:
+    """Write what a terminal would obey, such as the codes for colours in the name of a folder, as escapes."""
+    if is_printable(text):
+        return text
+    return "".join(letter.encode("unicode_escape").decode() if category(letter) in HIDDEN else letter
+                   for letter in text)
+
+
+def one_line(message: str) -> str:
+    """Return a message as one line that a terminal shows; double spaces stay, they may be part of a name."""
+    return printable(" ".join(filter(None, (line.strip() for line in message.splitlines()))))
 
 
 def format_number(value: Any) -> str:

@@ -5,6 +5,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+from pbcs_ompl.core.callbacks import describe
 from pbcs_ompl.core.errors import MissingDependency, PbcsError, UnknownName
 
 GROUPS = {"planner": "pbcs_ompl.planners", "agent": "pbcs_ompl.agents", "environment package": "pbcs_ompl.envs"}
@@ -39,14 +40,20 @@ def load(kind: str, name: str) -> Any:
         raise MissingDependency(
             f"{kind} {name!r} needs {error.name!r}, which is not installed: pip install {error.name}"
         ) from error
+    except PbcsError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise PbcsError(f"cannot load the {kind} {name!r}: {describe(error)}") from error
 
 
 def _import(kind: str, path: str) -> Any:
     module, _, attribute = path.partition(":")
     try:
         return getattr(import_module(module), attribute)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise PbcsError(f"cannot load the {kind} {path!r}: {error} (expected module:attribute)") from error
+    except PbcsError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise PbcsError(f"cannot load the {kind} {path!r}: {describe(error)} (expected module:attribute)") from error
 
 
 @cache

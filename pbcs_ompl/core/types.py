@@ -10,6 +10,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pbcs_ompl.core.errors import BudgetUsedUp
+
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IndexArray = NDArray[np.int64]
@@ -48,6 +50,16 @@ class Counter:
     def __init__(self, budget: int | None = None):
         self.count = 0
         self.budget = budget
+
+    def spend(self, transitions: int) -> None:
+        """Count transitions that are about to be made.
+
+        Raises:
+            BudgetUsedUp: fewer are left; none of them is counted.
+        """
+        if transitions > self.left:
+            raise BudgetUsedUp(f"{transitions} transitions, but only {self.left} are left of {self.budget}")
+        self.count += transitions
 
     @property
     def left(self) -> int:

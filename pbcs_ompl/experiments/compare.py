@@ -18,8 +18,9 @@ from pbcs_ompl.experiments.records import REMEDY, make_missing_runs, read_record
 from pbcs_ompl.experiments.run import Failure, Record
 from pbcs_ompl.experiments.sweep import Environment, Options, Sweep, environment_specs, make_sweep
 from pbcs_ompl.experiments.workers import Executor, Limits, make_executor
-from pbcs_ompl.results.files import RESULT, write_json
+from pbcs_ompl.results.files import CONFIG, RESULT, write_json
 from pbcs_ompl.results.folder import open_run, read_config
+from pbcs_ompl.results.schema import CompareConfig, RunOfComparison, check
 
 DATABASE = "comparison.db"
 SECONDS_OF_GRACE = 20.0
@@ -114,14 +115,17 @@ def read_comparison(folder: str | Path) -> Comparison:
         DamagedFile: the folder holds no comparison, or a record in it is damaged.
     """
     path = Path(folder)
-    sweep = Sweep.from_config(read_config(path, "compare"))
+    config = read_config(path, "compare")
+    check(path / CONFIG, config, CompareConfig)
+    sweep = Sweep.from_config(config)
     return _merge(sweep, _read_records(path, sweep), path)
 
 
 def _read_records(folder: Path, sweep: Sweep) -> dict[str, Record]:
-    records = read_records(folder, list(sweep.runs()))
+    runs = {run.name: run for run in sweep.runs()}
+    records = read_records(folder, list(runs.values()), RunOfComparison)
     for name, record in records.items():
-        if not is_record_of(name, record):
+        if not is_record_of(runs[name], record):
             raise DamagedFile(f"{record_file(folder, name)} is not the record of the run {name}; {REMEDY}")
     return records
 

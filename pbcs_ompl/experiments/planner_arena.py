@@ -5,12 +5,12 @@ import json
 import os
 import platform
 import sqlite3
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stdout
 from datetime import datetime
 from operator import itemgetter
 from pathlib import Path
+from secrets import token_hex
 from typing import Any
 
 from ompl.tools import computeViews, readBenchmarkLog
@@ -73,17 +73,17 @@ def write_database(path: Path, logs: Sequence[Path]) -> None:
         RunFolderError: the file cannot be written.
     """
     with write_errors(path):
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        os.close(handle)
+        temporary = path.with_name(f".{path.name}.{token_hex(4)}")  # tempfile would hide it from all other users
         try:
+            temporary.touch(exist_ok=False)
             with redirect_stdout(io.StringIO()):  # it prints what it does
-                readBenchmarkLog(temporary, [str(log) for log in logs], False)
-                computeViews(temporary, False)
+                readBenchmarkLog(str(temporary), [str(log) for log in logs], False)
+                computeViews(str(temporary), False)
             os.replace(temporary, path)
         except sqlite3.OperationalError as error:
             raise OSError(f"SQLite: {error}") from error
         finally:
-            Path(temporary).unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
 
 
 def _preamble(sweep: Sweep, experiment: str, records: Sequence[Record]) -> Iterator[str]:
@@ -91,7 +91,7 @@ def _preamble(sweep: Sweep, experiment: str, records: Sequence[Record]) -> Itera
     yield f"Experiment {experiment}"
     yield "1 experiment properties"
     yield f"transition_limit INTEGER = {sweep.max_transitions}"
-    yield f"Running on {platform.node() or 'unknown'}"
+    yield f"Running on {platform.machine() or 'unknown'}"  # not the name of the machine: logs are published
     yield f"Starting at {datetime.now().isoformat(sep=' ', timespec='seconds')}"
     yield from _block(json.dumps(sweep.config(), default=plain))
     yield from _block(provenance()["processor"])

@@ -44,9 +44,17 @@ def failed_record(run: Run, failure: Failure) -> Record:
     return {**_identity(run), "solved": False, **dict.fromkeys(MEASURED), "reason": failure.reason}
 
 
-def is_record_of(name: str, record: Record) -> bool:
-    """Return whether this is a record of the run of this name."""
-    return record.get("name") == name and record.keys() >= {*IDENTITY, *MEASURED, "solved", "reason"}
+def is_record_of(run: Run, record: Record) -> bool:
+    """Return whether a record is that of this run, and says no more than a run can find.
+
+    Args:
+        run: The run.
+        record: A `RunOfComparison`, by its types.
+    """
+    same = all(record[name] == value for name, value in _identity(run).items())
+    needed = ("transitions", "seconds", "path_length") if record["solved"] else ()
+    lengths = {len(numbers) for numbers in (record["progress"] or {}).values()}
+    return same and all(record[name] is not None for name in needed) and len(lengths) <= 1
 
 
 def folder_of(record: Record) -> str:
@@ -60,7 +68,7 @@ def _identity(run: Run) -> Record:
 
 def _plan(settings: dict[str, Any], **limits: Any) -> PlanResult:
     chosen = {name: settings[name] for name in ("planner_kwargs", "seed", "max_transitions", "max_seconds")} | limits
-    return plan(EnvSpec.from_dict(settings["environment"]), settings["planner"], coverage=True, **chosen)
+    return plan(EnvSpec.from_dict(settings["environment"], trusted=True), settings["planner"], coverage=True, **chosen)
 
 
 def _coverage(coverage: Coverage | None) -> Record:
@@ -83,13 +91,13 @@ def _warm_up(settings: dict[str, Any]) -> None:
 def _reset_peak_of_memory() -> None:
     """Have Linux measure the peak of this process's memory from now on."""
     with suppress(OSError):  # another system
-        Path("/proc/self/clear_refs").write_text("5")
+        Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
 
 
 def _peak_megabytes() -> float | None:
     """Return the most memory this process has had, in MB of 10^6 bytes; None where the system is not Linux."""
     try:
-        status = Path("/proc/self/status").read_text()
+        status = Path("/proc/self/status").read_text(encoding="utf-8")
     except OSError:
         return None
     peak = re.search(r"VmHWM:\s*(\d+) kB", status)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
@@ -25,23 +25,26 @@ def record_file(folder: Path, name: str) -> Path:
     return folder / RUNS / f"{name}.json"
 
 
-def read_records(folder: Path, runs: Sequence[Run]) -> dict[str, Record]:
+def read_records(folder: Path, runs: Sequence[Run], kind: Any = dict[str, Any]) -> dict[str, Record]:
     """Return the records of the runs that were made, by their names.
+
+    Args:
+        folder: The folder of the experiment.
+        runs: The runs.
+        kind: What a record holds: a type of `results.schema`.
 
     Raises:
         DamagedFile: a record is damaged. It is never replaced silently: what damaged it may have damaged others.
     """
     files = {run.name: record_file(folder, run.name) for run in runs}
-    return {name: _read_record(file) for name, file in files.items() if file.is_file()}
+    return {name: _read_record(file, kind) for name, file in files.items() if file.exists()}
 
 
-def _read_record(file: Path) -> Record:
+def _read_record(file: Path, kind: Any) -> Record:
     try:
-        record = read_json(file)
+        record: Record = read_json(file, kind, finite=False)  # a study may record NaN
     except DamagedFile as error:
         raise DamagedFile(f"{error}; {REMEDY}") from error
-    if not isinstance(record, dict):
-        raise DamagedFile(f"{file} is damaged: expected an object, got {type(record).__name__}; {REMEDY}")
     return record
 
 

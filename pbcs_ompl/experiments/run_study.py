@@ -1,5 +1,6 @@
 """Run a study: the runs that were not made yet, then the analysis; or one shard of the runs."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from pbcs_ompl.core.types import ProgressCallback
 from pbcs_ompl.experiments.claims import Claim
 from pbcs_ompl.experiments.records import Results, make_missing_runs, read_records
 from pbcs_ompl.experiments.run import Failure, Record, Run, Shard
-from pbcs_ompl.experiments.study import Study, find_study
+from pbcs_ompl.experiments.study import STUDIES, Study, find_study
 from pbcs_ompl.experiments.workers import Executor, Limits, make_executor
 from pbcs_ompl.results.files import FIGURES
 from pbcs_ompl.results.folder import RunFolder, open_run
@@ -123,9 +124,17 @@ def run_shard(study: Study | str | Path, shard: Shard, *, out: str | Path, seeds
 
 def open_study(study: Study, out: str | Path, seeds: int | None = None, *, shard: str = "") -> RunFolder:
     """Open the folder for the results of a study, a new one or one with results; see `open_run`."""
-    config = {"kind": "study", "study": study.id, "folder": study.folder, "seeds": study.number_of_seeds(seeds),
-              **study.sweep}
+    config = {"kind": "study", "study": study.id, "folder": _published(study.folder),
+              "seeds": study.number_of_seeds(seeds), **study.sweep}
     return open_run(Path(out), config, may_change=("folder", "seeds"), shard=shard)
+
+
+def _published(folder: Path) -> str | None:
+    """Return the folder of a study without the user's home; None for a study of the package, which has its id."""
+    if folder.parent == STUDIES:
+        return None
+    home = Path(os.path.expanduser("~"))  # which stays ~ for a user without a home
+    return f"~/{folder.relative_to(home)}" if folder.is_relative_to(home) else str(folder)
 
 
 def _study(study: Study | str | Path) -> Study:

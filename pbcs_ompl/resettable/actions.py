@@ -71,6 +71,10 @@ class ActionMap:
         """Return the action for one control [A]."""
         return self.to_actions(np.asarray(control)[None])[0]
 
+    def draw(self, rng: np.random.Generator) -> Any:
+        """Return a random action: uniform in the box of controls."""
+        return self.to_action(rng.uniform(self.low, self.high))
+
     def to_controls(self, actions: Actions) -> Array:
         """Return controls [B, A] that give actions [B, *shape]."""
         return np.array(actions, dtype=np.float64).reshape(len(actions), len(self.first))

@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from pbcs_ompl.core.callbacks import describe
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, PbcsError, UnknownName
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -21,6 +22,7 @@ from pbcs_ompl.resettable.attributes import misspelt
 from pbcs_ompl.resettable.branching import LONG, first_difference
 from pbcs_ompl.resettable.make import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.resettable.supported import task_maker
 
 STEPS = 30
 
@@ -98,12 +100,12 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
     except Exception as error:  # an author's mistake is a finding, not a crash
         if not isinstance(env, str | EnvSpec | gymnasium.Env):
             raise
-        found = str(error) if isinstance(error, PbcsError) else _describe(error)
+        found = str(error) if isinstance(error, PbcsError) else describe(error)
         return ResetReport(name, (Check("has an adapter", False, found),))
     try:
         trial = _Trial(model, seed)
     except Exception as error:  # as above
-        return ResetReport(model.spec.id, (Check("can be stepped", False, _describe(error)),))
+        return ResetReport(model.spec.id, (Check("can be stepped", False, describe(error)),))
     tests = [
         ("a restored state continues as before", trial.restored),
         ("the same after other steps and another reset", trial.disturbed),
@@ -124,12 +126,8 @@ def _run(name: str, test: Callable[[], str]) -> Check:
     try:
         found = test()
     except Exception as error:  # an author's mistake is a finding, not a crash
-        found = _describe(error)
+        found = describe(error)
     return Check(name, not found, found)
-
-
-def _describe(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
 
 
 class _Trial:
@@ -182,12 +180,14 @@ class _Trial:
         spec = self.model.spec
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the first instance has warned
-            return adapt(self.model.make_env(), goal=spec.goal, feature=spec.feature).env
+            return adapt(self.model.make_env(), goal=spec.goal, feature=spec.feature,
+                         reset_options=spec.reset_options).env
 
     def branches(self) -> str:
-        if self.model.make_env is None:
+        make_inner = task_maker(self.model.make_env, self.model.spec.reset_options)
+        if make_inner is None:
             return ""
-        return first_difference(self.env, self.model.make_env, steps=LONG, seed=self.seed + 1)
+        return first_difference(self.env, make_inner, steps=LONG, seed=self.seed + 1)
 
     def spelling(self) -> str:
         return "; ".join(f"{name!r} is not read; did you mean {meant!r}?"

@@ -1,12 +1,14 @@
 """Fresh environments of a task: made by Gymnasium from its id, or copied from an object before anything ran in it."""
 
+import warnings
 from collections.abc import Callable
 from copy import deepcopy
 from typing import Any
 
 import gymnasium
-from gymnasium.wrappers import TimeLimit
+from gymnasium.wrappers import RepeatAction, TimeLimit
 
+from pbcs_ompl.core.callbacks import describe
 from pbcs_ompl.core.env_spec import EnvSpec
 
 EnvMaker = Callable[[], gymnasium.Env[Any, Any]]
@@ -37,6 +39,14 @@ def _maker_by_spec(env: gymnasium.Env[Any, Any], max_episode_steps: int | None) 
     return lambda: limited(gymnasium.make(spec, disable_env_checker=True), max_episode_steps)
 
 
+def close(env: gymnasium.Env[Any, Any]) -> None:
+    """Close an environment; what it raises then is no more than a warning, because nothing depends on it."""
+    try:
+        env.close()
+    except (Exception, SystemExit) as error:
+        warnings.warn(f"the environment raised when it was closed: {describe(error)}", stacklevel=2)
+
+
 def limited(env: gymnasium.Env[Any, Any], max_episode_steps: int | None) -> gymnasium.Env[Any, Any]:
     """Return `env` with episodes of that many steps; as it is for None."""
     if max_episode_steps is None:
@@ -50,8 +60,14 @@ def limited(env: gymnasium.Env[Any, Any], max_episode_steps: int | None) -> gymn
 
 def episode_limit(env: gymnasium.Env[Any, Any]) -> int | None:
     """Return after how many steps a wrapper of `env` cuts an episode off; None where none does."""
-    wrapper = _time_limit(env)
-    return None if wrapper is None else wrapper._max_episode_steps
+    repeats = 1
+    while isinstance(env, gymnasium.Wrapper):
+        if isinstance(env, TimeLimit):
+            return -(-env._max_episode_steps // repeats)
+        if isinstance(env, RepeatAction):
+            repeats *= env.num_repeats
+        env = env.env
+    return None
 
 
 def _time_limit(env: gymnasium.Env[Any, Any]) -> TimeLimit[Any, Any] | None:
@@ -66,10 +82,14 @@ def spec_of(env: gymnasium.Env[Any, Any]) -> EnvSpec:
     """Return the id and the options of an environment: those that differ from what its id is registered with.
 
     One that was not made by `gymnasium.make` has no id; its class's name stands in, from which it cannot be made again.
+    Nor can one in wrappers that transform, whose names stand around its own.
     """
+    name = type(env.unwrapped).__qualname__ if env.spec is None else env.spec.id
+    for layer in getattr(env, "layers", ()):
+        name = f"{type(layer).__name__}({name})"
     if env.spec is None:
-        return EnvSpec(type(env.unwrapped).__qualname__)
+        return EnvSpec(name)
     registered = gymnasium.registry[env.spec.id].kwargs if env.spec.id in gymnasium.registry else {}
-    return EnvSpec(env.spec.id, {name: value for name, value in env.spec.kwargs.items()
+    return EnvSpec(name, {name: value for name, value in env.spec.kwargs.items()
                                  if name != "render_mode" and repr(value) != repr(registered.get(name))})
 

@@ -12,16 +12,17 @@ from typing import Any, Literal, Protocol
 import gymnasium
 import numpy as np
 
-from pbcs_ompl.core.callbacks import callback_failed
+from pbcs_ompl.core.callbacks import code_of_others
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import NotVerified, PbcsError
+from pbcs_ompl.core.errors import NotVerified
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap
-from pbcs_ompl.resettable.fresh import EnvMaker
+from pbcs_ompl.resettable.fresh import EnvMaker, close
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rules import GoalRule, Outcome, goal_rule, granted_success
+from pbcs_ompl.resettable.task_env import explored_actions
 
 SIDE_BY_SIDE = 20
 """Episodes that a controller drives at the same time, each in an environment of its own."""
@@ -36,7 +37,7 @@ class Controller(Protocol):
         ...
 
     def act(self, observation: Any) -> Any:
-        """Return controls [B, A] for observations [B, O]; of one episode [A] for [O]."""
+        """Return actions [B, ...], members of the action space, for observations [B, O]; of one episode one for [O]."""
         ...
 
 
@@ -68,12 +69,14 @@ class Judge:
 
     Raises:
         NotVerified: it is not possible.
+        UntrustedModule: the goal was read from a file, and names a module.
     """
 
     def __init__(self, spec: EnvSpec, make_env: EnvMaker | None):
         if make_env is None:
             raise NotVerified(f"not verified: no fresh environment of {spec.id} can be made; register it with "
                               f"Gymnasium, or make it possible to copy it (copy.deepcopy)")
+        spec.check_trusted(known=[spec.id])  # making an environment checks its id
         self._spec, self._make_env = spec, make_env
         self._rule: GoalRule = granted_success if spec.goal is None else goal_rule(spec.goal)
 
@@ -103,17 +106,16 @@ class Judge:
                     break
                 episode.step(action)
         finally:
-            episode.env.close()
+            close(episode.env)
         return episode.execution("end of the actions", observed=True)
 
-    def drive(self, controller: Controller, *, episodes: int, reset_seed: int | None, max_steps: int,
+    def drive(self, controller: Controller, *, reset_seeds: Sequence[int | None], max_steps: int,
               epsilon: float = 0.0, seed: int = 0) -> list[Execution]:
         """Let a controller of observations drive episodes.
 
         Args:
             controller: Gets the observations as vectors.
-            episodes: How many.
-            reset_seed: The seed of every reset; that of the task, where it has one, comes first.
+            reset_seeds: The seed of the reset of each episode; that of the task, where it has one, comes first.
             max_steps: Steps after which an episode has failed, beside the limits of the environment itself.
             epsilon: Fraction of actions that are replaced by random ones.
             seed: Of these.
@@ -125,16 +127,17 @@ class Judge:
         results: list[Execution] = []
         envs: list[gymnasium.Env[Any, Any]] = []
         try:
-            while len(results) < episodes:
+            while len(results) < len(reset_seeds):
                 first = len(results)
-                count = min(SIDE_BY_SIDE, episodes - first)
-                envs += [self._make_env() for _ in range(count - len(envs))]
-                begun = [_Episode(env, self._spec, self._rule, reset_seed) for env in envs[:count]]
-                noise = [seeds.child(str(first + k)).generator() for k in range(count)]
+                chosen = reset_seeds[first:first + SIDE_BY_SIDE]
+                envs += [self._make_env() for _ in range(len(chosen) - len(envs))]
+                begun = [_Episode(env, self._spec, self._rule, reset_seed)
+                         for env, reset_seed in zip(envs, chosen, strict=False)]
+                noise = [seeds.child(str(first + k)).generator() for k in range(len(chosen))]
                 results += _drive(controller, begun, noise, epsilon, max_steps)
         finally:
             for env in envs:
-                env.close()
+                close(env)
         return results
 
 
@@ -145,16 +148,12 @@ class _Episode:
         self.env, self._rule = env, rule
         self.ending: Ending | None = None
         self._rewards: list[float] = []
-        try:
+        with code_of_others("the environment"):
             observation, info = env.reset(seed=spec.reset_seed(reset_seed), options=spec.reset_options)
             outcome = Outcome(env.unwrapped, observation, math.nan, False, info)
             if rule(outcome):
                 self.ending = "goal"
-        except PbcsError:
-            raise
-        except Exception as error:
-            raise callback_failed(error, "the environment") from error
-        self._observations = [flat(observation)]
+            self._observations = [flat(observation)]
 
     @property
     def observation(self) -> Array:
@@ -163,15 +162,11 @@ class _Episode:
 
     def step(self, action: Any) -> None:
         """Make one step with a copy of an action."""
-        try:
+        with code_of_others("the environment"):
             observation, reward, terminated, truncated, info = self.env.step(np.array(action)[()])
             success = self._rule(Outcome(self.env.unwrapped, observation, float(reward), bool(terminated), info))
-        except PbcsError:
-            raise
-        except Exception as error:
-            raise callback_failed(error, "the environment") from error
-        self._rewards.append(float(reward))
-        self._observations.append(flat(observation))
+            self._rewards.append(float(reward))
+            self._observations.append(flat(observation))
         if success:
             self.ending = "goal"
         elif terminated or truncated:
@@ -186,17 +181,14 @@ class _Episode:
 def _drive(controller: Controller, episodes: list[_Episode], noise: list[np.random.Generator], epsilon: float,
            max_steps: int) -> list[Execution]:
     """Let a controller drive episodes side by side until all have ended."""
-    actions = ActionMap.of(episodes[0].env.action_space)
+    actions = ActionMap.of(explored_actions(episodes[0].env))
     controller.reset(len(episodes))
     for _ in range(max_steps):
         going = [k for k, episode in enumerate(episodes) if episode.ending is None]
         if not going:
             break
-        controls = np.array(controller.act(np.array([episode.observation for episode in episodes])), np.float64)
+        chosen = controller.act(np.array([episode.observation for episode in episodes]))
         for k in going:
-            if epsilon > 0 and noise[k].random() < epsilon:
-                controls[k] = noise[k].uniform(actions.low, actions.high)
-        chosen = actions.to_actions(controls)
-        for k in going:
-            episodes[k].step(chosen[k])
+            by_chance = epsilon > 0 and noise[k].random() < epsilon
+            episodes[k].step(actions.draw(noise[k]) if by_chance else chosen[k])
     return [episode.execution("time limit") for episode in episodes]

@@ -2,6 +2,7 @@
 
 import inspect
 import os
+import sys
 from contextlib import redirect_stderr
 from dataclasses import replace
 from functools import partial
@@ -12,6 +13,7 @@ from typing import Any
 import gymnasium
 from gymnasium.envs import registration
 
+from pbcs_ompl.core.callbacks import code_of_others, describe
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, UnknownName, did_you_mean
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -60,14 +62,19 @@ def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[
     if isinstance(env, EnvSpec):
         return _make(replace(env, **given), env.goal if goal is None else goal,  # type: ignore[arg-type]
                      env.feature if feature is None else feature)
-    return _with_rules(adapt(env, goal=goal, feature=feature), given)
+    with code_of_others(f"the environment {type(env).__name__}"):
+        return _with_rules(adapt(env, goal=goal, feature=feature, reset_options=reset_options), given)
 
 
 def _make(spec: EnvSpec, goal: str | GoalRule | None, feature: str | FeatureRule | None) -> ResettableModel:
     load_environments()
     prefer_headless_rendering()
+    spec = replace(spec, goal=goal if isinstance(goal, str) else None,
+                   feature=feature if isinstance(feature, str) else None)
     make_env = partial(fresh_env, spec)
-    model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature, make_env=make_env)
+    with code_of_others(f"the environment {spec.id!r}"):
+        model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature, reset_options=spec.reset_options,
+                                   make_env=make_env)
     model.spec = replace(model.spec, id=spec.id, start_seed=spec.start_seed, reset_options=spec.reset_options,
                          max_episode_steps=spec.max_episode_steps)  # the id with its module, if it names one
     return model
@@ -81,10 +88,12 @@ def fresh_env(spec: EnvSpec) -> gymnasium.Env[Any, Any]:
     """
     load_environments()
     prefer_headless_rendering()
-    return _gymnasium_make(spec, disable_env_checker=True)
+    with code_of_others(f"the environment {spec.id!r}"):
+        return _gymnasium_make(spec, disable_env_checker=True)
 
 
 def _gymnasium_make(spec: EnvSpec, **options: Any) -> gymnasium.Env[Any, Any]:
+    spec.check_trusted(known=[spec.id] if is_registered(spec.id) else [])
     registered = _find(spec.id)
     try:
         _check_options(registered, spec.kwargs)
@@ -104,7 +113,9 @@ def _gymnasium_make(spec: EnvSpec, **options: Any) -> gymnasium.Env[Any, Any]:
         raise MissingDependency(f"{spec.id} does not run with the installed mujoco: pip install 'mujoco<=3.8' (the "
                                 f"mazes and Adroit run with newer ones)") from error
     except (TypeError, ValueError) as error:
-        raise InvalidOption(f"{spec.id} refuses its options {spec.kwargs}: {error}") from error
+        if not spec.kwargs:
+            raise
+        raise InvalidOption(f"{spec.id} refuses its options {spec.kwargs}: {describe(error)}") from error
 
 
 def _with_rules(model: ResettableModel, rules: dict[str, Any]) -> ResettableModel:
@@ -115,6 +126,12 @@ def _with_rules(model: ResettableModel, rules: dict[str, Any]) -> ResettableMode
         model.episode_limit = model.max_episode_steps = steps
         model.make_env = None if make_env is None else lambda: limited(make_env(), steps)
     return model
+
+
+def is_registered(env_id: str) -> bool:
+    """Return whether Gymnasium knows this id, and nothing has to be imported for it."""
+    module, _, name = env_id.rpartition(":")
+    return name in gymnasium.registry and (not module or module in sys.modules)
 
 
 def is_known(env_id: str) -> bool:
@@ -140,6 +157,8 @@ def _find(env_id: str) -> registration.EnvSpec:
         raise MissingDependency(f"environment {env_id!r}: there is no module {error.name!r}{remedy}") from error
     except gymnasium.error.Error as error:
         raise UnknownName("environment", env_id, _choices(name)) from error
+    except (Exception, SystemExit) as error:
+        raise InvalidOption(f"environment {env_id!r}: cannot import {module!r}: {describe(error)}") from error
 
 
 def _register_robotics() -> None:

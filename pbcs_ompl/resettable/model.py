@@ -9,6 +9,7 @@ from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, Counter
 from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.resettable.attributes import EnvAttributes
+from pbcs_ompl.resettable.bounds import widened
 from pbcs_ompl.resettable.fresh import EnvMaker, spec_of
 from pbcs_ompl.resettable.sampling import check_radius, draw_valid, roll_near, uniform_in_ball
 
@@ -112,7 +113,7 @@ class Model:
 
 
 def _bounds(env: Any, low: Array, high: Array) -> tuple[Array, Array]:
-    low, high = np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
+    low, high = widened(low, -np.inf), widened(high, np.inf)
     if low.ndim == 1 and low.shape == high.shape and np.isfinite(high - low).all() and (low < high).all():
         return low, high
     raise NotResettable(f"{type(env).__name__}: state_low and state_high must be finite vectors of one "

@@ -2,13 +2,68 @@
 
 from typing import Any
 
+import gymnasium
 import numpy as np
+from gymnasium import spaces
 
 from pbcs_ompl.core.types import Array
+from pbcs_ompl.resettable.bounds import widened
 
 
 def flat(observation: Any) -> Array:
-    """Return an observation as one vector; the entries of a dictionary in the order of their names."""
+    """Return an observation as one vector.
+
+    The entries of a dictionary follow each other in the order of their names, those of a tuple in their order; each
+    element of a `Discrete` space is one number (`gymnasium.wrappers.FlattenObservation` makes one-hot vectors of them).
+    """
     if isinstance(observation, dict):
-        return np.concatenate([flat(observation[key]) for key in sorted(observation)])
+        return np.concatenate([np.empty(0), *(flat(observation[key]) for key in sorted(observation))])
+    if isinstance(observation, tuple):
+        return np.concatenate([np.empty(0), *map(flat, observation)])
     return np.array(observation, dtype=np.float64).ravel()
+
+
+def parts(space: gymnasium.Space[Any]) -> list[gymnasium.Space[Any]]:
+    """Return the spaces that `flat` puts one after the other."""
+    if isinstance(space, spaces.Dict):
+        return [part for key in sorted(space.spaces) for part in parts(space.spaces[key])]
+    if isinstance(space, spaces.Tuple):
+        return [part for inner in space.spaces for part in parts(inner)]
+    return [space]
+
+
+def flat_size(space: gymnasium.Space[Any]) -> int:
+    """Return how many numbers `flat` makes of an observation."""
+    return sum(int(np.prod(part.shape or ())) for part in parts(space))
+
+
+def flat_bounds(space: gymnasium.Space[Any]) -> tuple[Array, Array]:
+    """Return the bounds of the numbers that `flat` makes of an observation; infinite ones where there are none."""
+    low, high = zip(*map(_part_bounds, parts(space)), strict=True)
+    return np.concatenate(low), np.concatenate(high)
+
+
+def unflat(vector: Array, space: gymnasium.Space[Any]) -> Any:
+    """Return the observation, a member of `space` but for rounding, that `flat` makes a vector of."""
+    if isinstance(space, spaces.Dict | spaces.Tuple):
+        inner = {key: space.spaces[key] for key in sorted(space.spaces)} if isinstance(space, spaces.Dict) else dict(
+            enumerate(space.spaces))
+        ends = np.cumsum([flat_size(part) for part in inner.values()])
+        made = {key: unflat(piece, part) for (key, part), piece in
+                zip(inner.items(), np.split(vector, ends[:-1]), strict=True)}
+        return made if isinstance(space, spaces.Dict) else tuple(made.values())
+    return np.asarray(vector).reshape(space.shape or ()).astype(space.dtype)[()]
+
+
+def _part_bounds(space: gymnasium.Space[Any]) -> tuple[Array, Array]:
+    if isinstance(space, spaces.Box):
+        return widened(space.low, -np.inf).ravel(), widened(space.high, np.inf).ravel()
+    size = flat_size(space)
+    if isinstance(space, spaces.Discrete):
+        return np.array([float(space.start)]), np.array([float(space.start + space.n - 1)])
+    if isinstance(space, spaces.MultiDiscrete):
+        return (np.array(space.start, np.float64).ravel(),
+                np.array(space.start + space.nvec - 1, np.float64).ravel())
+    if isinstance(space, spaces.MultiBinary):
+        return np.zeros(size), np.ones(size)
+    return np.full(size, -np.inf), np.full(size, np.inf)

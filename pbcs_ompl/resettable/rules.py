@@ -1,8 +1,6 @@
 """Goals and features of an environment that was not made for planning, in one line of text or as functions."""
 
-import operator
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple
 
@@ -11,6 +9,8 @@ import numpy as np
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.attributes import EnvAttributes
+from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.rule_language import WORDS, Values, parse_conditions, parse_values
 
 
 class Outcome(NamedTuple):
@@ -23,25 +23,14 @@ class Outcome(NamedTuple):
     """NaN after a reset, which no comparison holds for."""
     terminated: bool
     info: dict[str, Any]
+    named: Any = None
+    """The observation below wrappers that flatten it, in which a feature finds the goals by their names."""
 
 
 GoalRule = Callable[[Outcome], bool]
 FeatureRule = Callable[[Outcome], Array]
 
-SOURCES: dict[str, Callable[[Outcome], Any]] = {
-    "obs": lambda outcome: _whole(outcome.observation),
-    "qpos": lambda outcome: _simulated(outcome.env).qpos,
-    "qvel": lambda outcome: _simulated(outcome.env).qvel,
-    "state": lambda outcome: _attribute(outcome.env, "state"),
-    "achieved_goal": lambda outcome: _entry(outcome.observation, "achieved_goal"),
-    "desired_goal": lambda outcome: _entry(outcome.observation, "desired_goal"),
-    "reward": lambda outcome: [outcome.reward],
-    "terminated": lambda outcome: [outcome.terminated],
-    "success": lambda outcome: [reported_success(outcome)],
-}
-COMPARISONS = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
-PART = re.compile(r"\s*(\w+)\s*(?:\[\s*(\d*)\s*(:?)\s*(\d*)\s*\])?\s*")
-EXAMPLES = {"goal": "'reward>0' or 'qpos[0]>=0.45'", "feature": "'qpos[0:2]' or 'obs[0],obs[3]'"}
+EXAMPLES = {"goal": "'reward>0' or 'qpos[0]>=0.45 and |qvel[0]|<0.1'", "feature": "'qpos[0:2]' or 'obs[0],obs[3]'"}
 
 
 def reported_success(outcome: Outcome) -> bool:
@@ -84,37 +73,57 @@ def goal_rule(rule: str) -> GoalRule:
     """Return a function that says whether an outcome is a success.
 
     Args:
-        rule: `SOURCE[i] OP NUMBER`: the words of `SOURCES` and >, >=, <, <=, where all of the numbers that a slice
-            selects must fulfil it; or `module:function`.
+        rule: Conditions joined by `and`, each `VALUES OP NUMBER` (see `rule_language`), where all of the numbers that
+            a slice selects must fulfil it; or `module:function`.
 
     Raises:
         InvalidOption: the rule does not parse.
     """
-    if ":" in rule and "[" not in rule:
+    if _is_function(rule):
         goal: GoalRule = _imported("goal", rule)
         return goal
-    for symbol, compare in COMPARISONS.items():
-        left, found, right = rule.partition(symbol)
-        if found:
-            source, limit = _parse_part("goal", rule, left), _parse_number(rule, right)
-            return lambda outcome: bool(np.all(compare(source(outcome), limit)))
-    raise InvalidOption(f"goal rule {rule!r} compares nothing; expected something like {EXAMPLES['goal']}")
+    conditions = parse_conditions(rule, EXAMPLES["goal"])
+    return lambda outcome: all(condition.holds(_read("goal", rule, condition.values, outcome))
+                               for condition in conditions)
 
 
 def feature_rule(rule: str) -> FeatureRule:
     """Return a function from an outcome to the feature [F] that planners explore.
 
     Args:
-        rule: Parts joined by commas: `SOURCE`, `SOURCE[i]`, `SOURCE[i:j]`; or `module:function`.
+        rule: Values joined by commas (see `rule_language`); or `module:function`.
 
     Raises:
         InvalidOption: the rule does not parse.
     """
-    if ":" in rule and "[" not in rule:
+    if _is_function(rule):
         feature: FeatureRule = _imported("feature", rule)
         return feature
-    parts = [_parse_part("feature", rule, text) for text in rule.split(",")]
-    return lambda outcome: np.concatenate([part(outcome) for part in parts])
+    chosen = parse_values(rule, EXAMPLES["feature"])
+    return lambda outcome: np.concatenate([_read("feature", rule, values, outcome) for values in chosen])
+
+
+def observed_dims(rule: str, size: int) -> Sequence[int] | None:
+    """Return which numbers of an observation of `size` a feature rule selects, in order; None if it reads others."""
+    if _is_function(rule):
+        return None
+    chosen = parse_values(rule, EXAMPLES["feature"])
+    if any(values.source != "obs" or values.absolute for values in chosen):
+        return None
+    return [dim for values in chosen for dim in range(size)[values.part]]
+
+
+def _is_function(rule: str) -> bool:
+    return ":" in rule and "[" not in rule
+
+
+def _read(kind: str, rule: str, values: Values, outcome: Outcome) -> Array:
+    """Return the numbers [N] that `values` selects of an outcome."""
+    found = np.asarray(SOURCES[values.source](outcome, values.keys), dtype=np.float64).ravel()
+    if not values.fits(len(found)):
+        raise InvalidOption(f"{kind} rule {rule!r}: {values.name} has {len(found)} numbers, 0 to {len(found) - 1}")
+    picked: Array = found[values.part].copy()
+    return np.abs(picked) if values.absolute else picked
 
 
 def _imported(kind: str, rule: str) -> Any:
@@ -133,49 +142,6 @@ def _found(module: str, name: str) -> Any:
         return None
 
 
-def _parse_part(kind: str, rule: str, text: str) -> FeatureRule:
-    match = PART.fullmatch(text)
-    if match is None:
-        raise InvalidOption(f"{kind} rule {rule!r} does not parse at {text.strip()!r}; expected something like "
-                            f"{EXAMPLES[kind]}")
-    name, first, colon, last = match.groups()
-    if name not in SOURCES:
-        raise InvalidOption(f"{kind} rule {rule!r}: unknown source {name!r}{did_you_mean(name, SOURCES)}")
-    source, chosen = SOURCES[name], _slice(first, colon, last)
-
-    def read(outcome: Outcome) -> Array:
-        values = np.asarray(source(outcome), dtype=np.float64).ravel()
-        picked = values[chosen]
-        wanted = chosen.stop if chosen.stop is not None else (chosen.start or 0) + 1
-        if not picked.size or wanted > len(values):
-            raise InvalidOption(f"{kind} rule {rule!r}: {name} has {len(values)} numbers, 0 to {len(values) - 1}")
-        return picked.copy()
-
-    return read
-
-
-def _slice(first: str | None, colon: str | None, last: str | None) -> slice:
-    if first is None or (not first and not last):
-        return slice(None)
-    start = int(first) if first else 0
-    if not colon:
-        return slice(start, start + 1)
-    return slice(start, int(last) if last else None)
-
-
-def _parse_number(rule: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise InvalidOption(f"goal rule {rule!r}: expected a number after the comparison, got {text!r}") from error
-
-
-def _whole(observation: Any) -> Any:
-    if isinstance(observation, dict):
-        return np.concatenate([np.ravel(observation[key]) for key in sorted(observation)])
-    return observation
-
-
 def _simulated(env: Any) -> Any:
     data = getattr(env, "data", None)
     if not hasattr(data, "qpos"):
@@ -189,7 +155,39 @@ def _attribute(env: Any, name: str) -> Any:
     return getattr(env, name)
 
 
-def _entry(observation: Any, key: str) -> Any:
-    if not isinstance(observation, dict) or key not in observation:
-        raise InvalidOption(f"the observation has no {key!r}; use obs, qpos or qvel")
-    return observation[key]
+def _entry(outcome: Outcome, key: str) -> Any:
+    for observation in (outcome.observation, outcome.named):
+        if isinstance(observation, dict) and key in observation:
+            return observation[key]
+    raise InvalidOption(f"the observation has no {key!r}; use obs, qpos or qvel")
+
+
+def _from_info(outcome: Outcome, keys: tuple[str, ...]) -> Any:
+    """Return what `info` holds under keys; NaN, for which no comparison holds, where a reset does not report it yet."""
+    found: Any = outcome.info
+    for key in keys:
+        if not isinstance(found, dict) or key not in found:
+            if np.isnan(outcome.reward):
+                return [np.nan]
+            known = found if isinstance(found, dict) else {}
+            raise InvalidOption(f"info has no {key!r}{did_you_mean(key, [str(name) for name in known])}")
+        found = found[key]
+    try:
+        return np.asarray(found, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidOption(f"info{''.join(f'[{key}]' for key in keys)} is {found!r}; expected numbers") from error
+
+
+SOURCES: dict[str, Callable[[Outcome, tuple[str, ...]], Any]] = {
+    "obs": lambda outcome, _: flat(outcome.observation),
+    "qpos": lambda outcome, _: _simulated(outcome.env).qpos,
+    "qvel": lambda outcome, _: _simulated(outcome.env).qvel,
+    "state": lambda outcome, _: _attribute(outcome.env, "state"),
+    "achieved_goal": lambda outcome, _: _entry(outcome, "achieved_goal"),
+    "desired_goal": lambda outcome, _: _entry(outcome, "desired_goal"),
+    "reward": lambda outcome, _: [outcome.reward],
+    "terminated": lambda outcome, _: [outcome.terminated],
+    "success": lambda outcome, _: [reported_success(outcome)],
+    "info": _from_info,
+}
+assert set(SOURCES) == set(WORDS)

@@ -108,8 +108,8 @@ def _roll(model: ResettableModel, states: Array, rng: np.random.Generator, most:
         if not len(moving):
             break
         controls = rng.uniform(model.action_low, model.action_high, (len(moving), len(model.action_low)))
+        counter.spend(len(moving))
         outcome = model.transition(states[moving], controls)
-        counter.count += len(moving)
         states[moving] = outcome.states
         ended[moving] = outcome.ended
     return states[~ended]

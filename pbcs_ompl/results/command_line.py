@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from unicodedata import category
 
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.plain import plain
@@ -17,8 +18,21 @@ BUDGETS = ("max_transitions", "max_seconds", "max_memory")
 
 
 def command(words: Sequence[str]) -> str:
-    """Return a command line, quoted for a shell."""
-    return shlex.join(["pbcs", *words])
+    """Return a command line of ours, quoted for a shell."""
+    return shell("pbcs", *words)
+
+
+def shell(*words: str) -> str:
+    """Return words quoted for a shell, in one line without control characters."""
+    return " ".join(map(_quoted, words))
+
+
+def _quoted(word: str) -> str:
+    if not any(category(letter) in ("Cc", "Cs") for letter in word):
+        return shlex.quote(word)
+    bytes_in_word = word.encode(errors="surrogateescape")
+    letters = (chr(byte) if 32 <= byte < 127 and chr(byte) not in "'\\" else f"\\{byte:03o}" for byte in bytes_in_word)
+    return f"$'{''.join(letters)}'"
 
 
 def environment_words(spec: EnvSpec) -> Words:
@@ -47,17 +61,30 @@ def train_words(config: dict[str, Any], trajectory: Path | None = None) -> Words
             *_json_words("--agent-settings", config["agent_settings"]), *_budgets(config)]
 
 
-def resume_words(folder: Path, max_transitions: int | None = None) -> Words:
-    """Return the words that resume a training in a folder, with another budget if one is given."""
+def resume_words(folder: Path, max_transitions: int | None = None, *, trust: bool = False) -> Words:
+    """Return the words that resume a training in a folder.
+
+    Args:
+        folder: The folder.
+        max_transitions: Another budget; None for the old one.
+        trust: Import the modules that the folder names.
+    """
     budget = [] if max_transitions is None else ["--max-transitions", str(max_transitions)]
-    return ["train", "--resume", str(folder), *budget]
+    return ["train", "--resume", str(folder), *budget, *_trust(trust)]
 
 
-def eval_words(folder: str | Path, *, episodes: int | None = None, epsilon: float | None = None) -> Words:
-    """Return the words of an evaluation of the chain in a folder; what is None is left out."""
+def eval_words(folder: str | Path, *, episodes: int | None = None, epsilon: float | None = None,
+               trust: bool = False) -> Words:
+    """Return the words of an evaluation of the chain in a folder.
+
+    Args:
+        folder: The folder.
+        episodes, epsilon: Options; None to leave them out.
+        trust: Import the modules that the folder names.
+    """
     options = {"--episodes": episodes, "--epsilon": epsilon}
     return ["eval", str(folder), *(word for name, value in options.items() if value is not None
-                                   for word in (name, str(value)))]
+                                   for word in (name, str(value))), *_trust(trust)]
 
 
 def compare_words(config: dict[str, Any]) -> Words:
@@ -68,7 +95,7 @@ def compare_words(config: dict[str, Any]) -> Words:
         environments = environment_words(specs[0])
     else:
         environments = ["--env", *(spec.id for spec in specs), "--env-kwargs",
-                        *(json.dumps(spec.kwargs, default=plain) for spec in specs), *_rule_words(specs[0])]
+                        *(_json(spec.kwargs) for spec in specs), *_rule_words(specs[0])]
     return ["compare", "--planners", *config["planners"], *_json_words("--planner-kwargs", options), *environments,
             "--seeds", str(len(config["seeds"])), *_budgets(config)]
 
@@ -83,6 +110,10 @@ def study_words(study: str | Path, *, seeds: int | None = None, device: str | No
 def report_words(folder: Path) -> Words:
     """Return the words that write the report of a folder."""
     return ["report", str(folder)]
+
+
+def _trust(trust: bool) -> Words:
+    return ["--trust"] if trust else []
 
 
 def _environment(config: dict[str, Any]) -> Words:
@@ -100,7 +131,11 @@ def _rule_words(spec: EnvSpec) -> Words:
 
 def _json_words(option: str, values: dict[str, Any]) -> Words:
     """Return an option whose value is a JSON object; nothing where that is empty."""
-    return [option, json.dumps(values, default=plain)] if values else []
+    return [option, _json(values)] if values else []
+
+
+def _json(values: dict[str, Any]) -> str:
+    return json.dumps(values, default=plain, ensure_ascii=False)
 
 
 def _budgets(config: dict[str, Any]) -> Words:

@@ -1,9 +1,12 @@
 """Files of result folders: their names, and reading and writing them. A file that is written is whole or absent."""
 
 import errno
+import io
 import json
 import os
-import tomllib
+import re
+import stat
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +19,9 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
 from pbcs_ompl.core.plain import plain
+from pbcs_ompl.core.text_values import parse_json, parse_toml
+from pbcs_ompl.core.utf8 import utf8
+from pbcs_ompl.results.schema import check
 
 CONFIG, RESULT, PROVENANCE = "config.toml", "result.json", "provenance.json"
 """Every folder: the settings that repeat the run, what it found, with which versions and machines."""
@@ -26,6 +32,8 @@ PLAN, CHECKPOINT, CHAIN = "plan.json", "checkpoint.npz", "chain"
 RUNS, FIGURES = "runs", "figures"
 """pbcs compare and pbcs study: the folders of the records, and of the pictures of a study."""
 Content = TypeVar("Content")
+MOST_BYTES, MOST_ARRAY_BYTES, MOST_ARRAYS = 1 << 28, 1 << 33, 100_000
+"""What is read of one file, so that a small file of another person does not fill the memory."""
 
 
 @contextmanager
@@ -59,9 +67,21 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
             raise
 
 
+TEMPORARY = re.compile(r"\..+\.[0-9a-f]{8}")
+"""The names of the files that `write_atomically` renames at its end."""
+
+
+def sweep_temporaries(folder: Path) -> None:
+    """Remove what processes that were killed while they wrote have left in a folder and those below it."""
+    for place, _, names in os.walk(folder):
+        for name in filter(TEMPORARY.fullmatch, names):
+            (Path(place) / name).unlink(missing_ok=True)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file atomically."""
-    write_atomically(path, lambda file: file.write(text.encode()))
+    content = utf8(text)
+    write_atomically(path, lambda file: file.write(content))
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -79,43 +99,93 @@ def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:
     write_atomically(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
 
 
-def read_json(path: Path) -> Any:
+def read_json(path: Path, kind: Any = Any, *, finite: bool = True) -> Any:
     """Read JSON.
 
+    Args:
+        path: The file.
+        kind: What it should hold: a type of `results.schema`; anything by default.
+        finite: Whether NaN and Infinity are refused.
+
     Raises:
-        DamagedFile: the file is missing, truncated or not JSON.
+        DamagedFile: the file is missing, truncated, not JSON, or holds something else than `kind`.
     """
-    return _read(path, lambda: json.loads(path.read_text()), OSError, ValueError)
+    value = _read(path, lambda: parse_json(read_bytes(path).decode("utf-8"), finite=finite))
+    check(path, value, kind)
+    return value
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path, kind: Any = dict[str, Any]) -> dict[str, Any]:
     """Read TOML.
 
+    Args:
+        path: The file.
+        kind: What it should hold: a type of `results.schema`; anything by default.
+
     Raises:
-        DamagedFile: the file is missing or does not parse.
+        DamagedFile: the file is missing, does not parse, or holds something else than `kind`.
     """
-    return _read(path, lambda: tomllib.loads(path.read_text()), OSError, ValueError)
+    table = _read(path, lambda: parse_toml(read_bytes(path).decode("utf-8")))
+    check(path, table, kind)
+    return table
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Read all arrays of an npz, without pickle.
+    """Read all arrays of an npz, without pickle; each is read to its end, where its checksum is compared.
 
     Raises:
-        DamagedFile: the file is missing or truncated.
+        DamagedFile: the file is missing, truncated, or so large that it can only be a trap.
     """
-    def load() -> dict[str, NDArray[Any]]:
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-
-    return _read(path, load, Exception)  # zipfile, zlib, ValueError, EOFError: all mean the same to the user
+    return _read(path, lambda: _arrays(path))
 
 
-def _read(path: Path, load: Callable[[], Content], *damage: type[Exception]) -> Content:
+def read_bytes(path: Path) -> bytes:
+    """Read a file that has to be a regular one: a pipe would wait for ever.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is something else, or too large.
+    """
+    _check_regular(path, MOST_BYTES)
+    return path.read_bytes()
+
+
+def _check_regular(path: Path, most: int) -> None:
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise ValueError("it is no regular file")
+    if status.st_size > most:
+        raise ValueError(f"it has {status.st_size:,} bytes; expected at most {most:,}")
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    _check_regular(path, MOST_ARRAY_BYTES)
+    with zipfile.ZipFile(path) as file:
+        members = file.infolist()
+        size = sum(member.file_size for member in members)
+        if size > MOST_ARRAY_BYTES or len(members) > MOST_ARRAYS:
+            raise ValueError(f"{len(members):,} arrays of {size:,} bytes; expected at most {MOST_ARRAYS:,} of "
+                             f"{MOST_ARRAY_BYTES:,}")
+        arrays = {member.filename.removesuffix(".npy"): _array(file, member) for member in members}
+    if len(arrays) < len(members):
+        raise ValueError("an array is there twice")
+    return arrays
+
+
+def _array(file: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
+    content = io.BytesIO(file.read(member))  # zipfile compares the checksum at the end only
+    array = np.lib.format.read_array(content, allow_pickle=False)
+    if content.read(1):
+        raise ValueError(f"{member.filename} has bytes behind its array")
+    return array
+
+
+def _read(path: Path, load: Callable[[], Content]) -> Content:
     try:
         return load()
     except FileNotFoundError as error:
         raise DamagedFile(f"{path} does not exist") from error
-    except damage as error:
+    except Exception as error:  # zipfile, zlib, ValueError, EOFError, OSError: all mean the same to the user
         raise DamagedFile(f"{path} is damaged: {error}") from error
 
 

@@ -17,14 +17,16 @@ from pbcs_ompl.results.files import (
     RESULT,
     read_json,
     read_toml,
+    sweep_temporaries,
     to_toml,
     write_errors,
     write_json,
     write_toml,
 )
 from pbcs_ompl.results.provenance import provenance
+from pbcs_ompl.results.schema import CONFIGS, RESULTS, Provenance, check
 
-KINDS = ("plan", "train", "eval", "compare", "study")
+KINDS = tuple(CONFIGS)
 """What a folder may hold: the `kind` of its config.toml, named after the verb that wrote it."""
 LOCK = ".lock"
 
@@ -43,16 +45,21 @@ class RunFolder:
 
     def __init__(self, path: str | Path, *, resume: bool = False, shard: str = ""):
         self.path = Path(path)
+        with write_errors(self.path):
+            self._check(resume)
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._locks = _locked(self.path, shard)
+            if not shard:  # other shards may be writing
+                sweep_temporaries(self.path)
+        if resume:
+            self._note_provenance()
+
+    def _check(self, resume: bool) -> None:
         if resume and not (self.path / CONFIG).is_file():
             raise RunFolderError(f"nothing to resume: {self.path / CONFIG} does not exist")
         leftovers = (LOCK, f".{CONFIG}.")  # of a process that was killed before it wrote its settings
         if not resume and self.path.is_dir() and any(not p.name.startswith(leftovers) for p in self.path.iterdir()):
             raise RunFolderError(f"{self.path} already exists; choose another --out, or remove it first")
-        with write_errors(self.path):
-            self.path.mkdir(parents=True, exist_ok=True)
-            self._locks = _locked(self.path, shard)
-        if resume:
-            self._note_provenance()
 
     def __enter__(self) -> "RunFolder":
         return self
@@ -76,7 +83,7 @@ class RunFolder:
     def _note_provenance(self) -> None:
         """Add this process to those that worked here, unless one with the same versions and machine did."""
         path = self.path / PROVENANCE
-        before = read_json(path) if path.is_file() else []
+        before = read_json(path, Provenance) if path.is_file() else []
         if provenance() not in before:
             write_json(path, [*before, provenance()])
 
@@ -93,6 +100,39 @@ def _locked(path: Path, shard: str) -> ExitStack:
             with lock(other):  # raises where it is held
                 pass
         return locks.pop_all()
+
+
+def start_run(path: Path, config: dict[str, Any], *, may_change: tuple[str, ...], parts: tuple[str, ...]) -> RunFolder:
+    """Open a new folder, or the one in which a run with the same settings was killed before it had a result.
+
+    Args:
+        path: The folder.
+        config: The settings; see `RunFolder.write_config`.
+        may_change: Settings that do not tell two runs apart.
+        parts: The files of such a run, which are removed: it is made again.
+
+    Raises:
+        RunFolderError: the folder holds something else, is in use, or cannot be written.
+    """
+    killed = _was_killed(path, config, may_change)
+    opened = RunFolder(path, resume=killed)
+    for part in parts if killed else ():
+        (path / part).unlink(missing_ok=True)
+    opened.write_config(config)
+    return opened
+
+
+def _was_killed(path: Path, config: dict[str, Any], may_change: tuple[str, ...]) -> bool:
+    with write_errors(path):
+        if not (path / CONFIG).is_file() or (path / RESULT).exists():
+            return False
+    return not set(_different(path, config)) - set(may_change)
+
+
+def _different(path: Path, config: dict[str, Any]) -> list[str]:
+    """Return the settings that are not those in a folder."""
+    before, now = read_toml(path / CONFIG), tomllib.loads(to_toml(config))
+    return sorted(key for key in before.keys() | now.keys() if before.get(key) != now.get(key))
 
 
 def open_run(path: Path, config: dict[str, Any], *, may_change: tuple[str, ...] = (), shard: str = "") -> RunFolder:
@@ -118,8 +158,7 @@ def _open_run(path: Path, config: dict[str, Any], may_change: tuple[str, ...], s
         opened = RunFolder(path, shard=shard)
         opened.write_config(config)
         return opened
-    before, now = read_toml(path / CONFIG), tomllib.loads(to_toml(config))
-    different = sorted(key for key in before.keys() | now.keys() if before.get(key) != now.get(key))
+    different = _different(path, config)
     forbidden = [key for key in different if key not in may_change]
     if forbidden:
         raise RunFolderError(f"{path} holds another run ({', '.join(forbidden)}); choose another --out")
@@ -163,11 +202,24 @@ def find_folders(root: Path) -> list[Path]:
 
 
 def _walk(root: Path) -> Iterator[Path]:
-    for place, folders, files in os.walk(root):
-        if CONFIG in files:
-            folders.clear()
+    waiting = [str(root)]
+    while waiting:  # os.walk calls itself for each level
+        place = waiting.pop()
+        entries = _entries(place)
+        if any(entry.name == CONFIG and not entry.is_dir() for entry in entries):
             yield Path(place)
-        folders[:] = [name for name in folders if not name.startswith(".")]
+        else:
+            waiting += [entry.path for entry in entries
+                        if entry.is_dir(follow_symlinks=False) and not entry.name.startswith(".")]
+
+
+def _entries(place: str) -> list["os.DirEntry[str]"]:
+    """Return what is in a folder; nothing where that cannot be read."""
+    try:
+        with os.scandir(place) as entries:
+            return list(entries)
+    except OSError:
+        return []
 
 
 def read_folder(path: Path) -> Folder:
@@ -177,9 +229,9 @@ def read_folder(path: Path) -> Folder:
         DamagedFile: a file in it is damaged, or its settings are not those of a run.
     """
     config = read_config(path)
-    result = read_json(path / RESULT) if (path / RESULT).is_file() else None
-    if not isinstance(result, dict | None):
-        raise DamagedFile(f"{path / RESULT} is not a result; expected a JSON object")
+    kind = config["kind"]
+    check(path / CONFIG, config, CONFIGS[kind])
+    result = read_json(path / RESULT, RESULTS[kind], finite=kind != "study") if (path / RESULT).exists() else None
     return Folder(path, config["kind"], config, result, _provenance(path, config))
 
 
@@ -203,9 +255,7 @@ def read_config(path: Path, kind: str | None = None) -> dict[str, Any]:
 def _provenance(path: Path, config: dict[str, Any]) -> list[dict[str, str]]:
     if not (path / PROVENANCE).is_file():
         return [config["versions"]] if "versions" in config else []
-    found = read_json(path / PROVENANCE)
-    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
-        raise DamagedFile(f"{path / PROVENANCE} is damaged: expected a list of JSON objects")
+    found: list[dict[str, str]] = read_json(path / PROVENANCE, Provenance)
     return found
 
 
@@ -221,9 +271,11 @@ def lock(path: Path, *, wait: bool = False) -> Iterator[None]:
         wait: Wait until no other process holds it.
 
     Raises:
-        RunFolderError: another process holds it.
+        RunFolderError: another process holds it, or it is a link, which would lead elsewhere.
         OSError: the file cannot be written, or its disk supports no locks.
     """
+    if path.is_symlink():
+        raise RunFolderError(f"{path} is a link; remove it, or choose another --out")
     file = FileLock(path, thread_local=False, poll_interval=POLL_SECONDS, fallback_to_soft=False)
     try:
         file.acquire(timeout=-1 if wait else 0)

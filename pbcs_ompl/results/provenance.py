@@ -40,7 +40,7 @@ def provenance() -> dict[str, str]:
 def _processor() -> str:
     """Return the processor's name; `platform.processor` knows none on most Linux machines."""
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]

@@ -145,8 +145,21 @@ class ClassifierSet:
 
     def probability(self, observations: Array) -> Array:
         """Return how likely the skill is to reach its target [B] from where it observes `observations` [B, O]."""
-        hidden = np.tanh((observations - self.origin) / self.scale @ self.weights_1 + self.bias_1)
-        return 1.0 / (1.0 + np.exp(-(hidden @ self.weights_2 + self.bias_2)[:, 0]))
+        return probability(observations, self.origin, self.scale, self.weights_1, self.bias_1, self.weights_2,
+                           self.bias_2)
+
+
+def probability(observations: Array, origin: Array, scale: Array, weights_1: Array, bias_1: Array, weights_2: Array,
+                bias_2: Array) -> Array:
+    """Return the output [B] of the network of a `ClassifierSet`.
+
+    Args:
+        observations: [B, O].
+        origin, scale: Mean and deviation of the observations it was learnt from [O].
+        weights_1, bias_1, weights_2, bias_2: The network, [O, H], [H], [H, 1], [1].
+    """
+    hidden = np.tanh((observations - origin) / scale @ weights_1 + bias_1)
+    return 1.0 / (1.0 + np.exp(-(hidden @ weights_2 + bias_2)[:, 0]))
 
 
 def learn_set(observations: Array, reached: BoolArray, ball: Ball, settings: ClassifierSettings,

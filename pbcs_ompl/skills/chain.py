@@ -6,26 +6,34 @@ from pathlib import Path
 import numpy as np
 
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch
+from pbcs_ompl.core.errors import DamagedFile, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
-from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.results.files import read_arrays, read_json, write_arrays, write_json
+from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
+from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.skills.activation_sets import ActivationSet, Target, from_arrays, kind_of, to_arrays
+from pbcs_ompl.skills.chain_files import read_chain, write_chain
+from pbcs_ompl.skills.controller import ChainController
 from pbcs_ompl.skills.episodes import with_random_actions
-from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
+from pbcs_ompl.skills.observed_sets import Entry, entry_from_arrays, entry_kinds, entry_to_arrays
+from pbcs_ompl.skills.policy import SkillPolicy
 from pbcs_ompl.skills.waypoints import Waypoints
-
-FORMAT = "pbcs_ompl skill chain"
-VERSION = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Skill:
-    """A policy, the set of states in which it may start, and where it leads."""
+    """A policy, where it may start and where it leads.
+
+    Attributes:
+        policy: What it does.
+        activation: The states in which it may start.
+        target: Where it leads.
+        entry: The activation set as a controller sees it; everywhere for the first skill.
+    """
 
     policy: SkillPolicy
     activation: ActivationSet
     target: Target
+    entry: Entry
 
 
 @dataclass(frozen=True)
@@ -49,19 +57,23 @@ class Rollouts:
 class SkillChain:
     """Ordered skills, from the environment's start to its goal; [Matheron2020] section 7.2.
 
-    The chain switches to a later skill as soon as that skill's activation set is entered, and never goes back.
+    The chain switches to a later skill as soon as that skill's entry is observed, and never goes back.
 
     Attributes:
         skills: In the order of execution.
         start: The state it was trained to start from [D].
         environment: The environment it was trained in.
         time_limit: Steps after which an execution counts as failed.
+        actions: The environment's action space.
+        reset_seed: The seed of the reset that leads to the start; None where none is known to.
     """
 
     skills: tuple[Skill, ...]
     start: Array
     environment: EnvSpec
     time_limit: int
+    actions: ActionMap
+    reset_seed: int | None = None
 
     @classmethod
     def of(cls, skills: list[Skill], waypoints: Waypoints, steps_per_skill: int) -> "SkillChain":
@@ -72,20 +84,28 @@ class SkillChain:
             waypoints: Those that they were trained along.
             steps_per_skill: Time limit of an execution, in steps for each skill.
         """
-        return cls(tuple(skills), waypoints.states[0], waypoints.model.spec, steps_per_skill * len(skills))
+        model = waypoints.model
+        actions = (ActionMap(model.action_low, model.action_high, model.action_low.shape) if model.env is None
+                   else ActionMap.of(model.env.action_space))
+        return cls(tuple(skills), waypoints.states[0], model.spec, steps_per_skill * len(skills), actions,
+                   waypoints.reset_seed)
 
-    def check_belongs_to(self, model: ResettableModel) -> None:
+    def check_belongs_to(self, environment: EnvSpec) -> None:
         """Raise Mismatch when the chain was trained in another environment."""
-        if not self.environment.same_as(model.spec):
-            raise Mismatch(f"the skill chain was trained in {self.environment}, not in {model.spec}")
+        if not self.environment.same_as(environment):
+            raise Mismatch(f"the skill chain was trained in {self.environment}, not in {environment}")
 
-    def controller(self, model: ResettableModel, count: int = 1) -> "ChainController":
-        """Return a controller of `count` executions side by side."""
-        return ChainController(self, model, count)
+    def controller(self) -> ChainController:
+        """Return the chain as a controller of observations, for one episode until its `reset` says otherwise."""
+        return ChainController([skill.policy for skill in self.skills], [skill.entry for skill in self.skills],
+                               self.actions)
 
     def rollouts(self, model: ResettableModel, starts: Array, *, epsilon: float = 0.0,
-                 rng: np.random.Generator | None = None, max_steps: int | None = None) -> Rollouts:
-        """Execute the chain from several states side by side.
+                 rng: np.random.Generator | None = None, max_steps: int | None = None,
+                 counter: Counter | None = None) -> Rollouts:
+        """Execute the chain from several states side by side, in the model and not in a fresh environment.
+
+        This is for training and for pictures; `evaluate` measures success.
 
         Args:
             model: The environment.
@@ -93,16 +113,23 @@ class SkillChain:
             epsilon: Fraction of actions that are replaced by random ones.
             rng: Source of random actions.
             max_steps: Time limit in steps; None for that of the chain.
+            counter: Counts every transition.
+
+        Raises:
+            BudgetUsedUp: in the middle of the executions.
         """
-        rng = rng or np.random.default_rng(0)
+        rng, counter = rng or np.random.default_rng(0), counter or Counter()
         limit = self.time_limit if max_steps is None else max_steps
-        controller = self.controller(model, len(starts))
+        controller = self.controller()
+        controller.reset(len(starts))
         states, trace = starts.copy(), [starts[0].copy()]
         success = np.zeros(len(starts), dtype=bool)
         steps = np.full(len(starts), limit, dtype=np.int64)
         alive = np.arange(len(starts))
         for step in range(1, limit + 1):
-            controls = with_random_actions(model, controller.act(states[alive], alive), epsilon, rng)
+            actions = controller.act(model.observe(states[alive]), alive)
+            controls = with_random_actions(model, self.actions.to_controls(actions), epsilon, rng)
+            counter.spend(len(alive))
             outcome = model.transition(states[alive], controls)
             states[alive] = outcome.states
             if alive[0] == 0:
@@ -129,65 +156,40 @@ class SkillChain:
 
     def save(self, folder: str | Path) -> None:
         """Write chain.json (structure), chain.npz (activation sets and targets) and chain.safetensors (policies)."""
-        folder = Path(folder)
-        save_policies(folder / "chain.safetensors", [skill.policy for skill in self.skills])
-        arrays = {"start": self.start}
+        arrays = {"start": self.start, "first_action": self.actions.first, "last_action": self.actions.last}
         for index, skill in enumerate(self.skills):
             arrays |= to_arrays(skill.activation, f"activation{index}") | to_arrays(skill.target, f"target{index}")
-        write_arrays(folder / "chain.npz", **arrays)
-        write_json(folder / "chain.json", {
-            "format": FORMAT, "version": VERSION, "environment": self.environment.to_dict(),
-            "time_limit": self.time_limit,
-            "skills": [{"activation": kind_of(s.activation), "target": kind_of(s.target)} for s in self.skills]})
+            arrays |= entry_to_arrays(skill.entry, f"entry{index}")
+        seed = {} if self.reset_seed is None else {"reset_seed": self.reset_seed}
+        write_chain(Path(folder), {
+            "environment": self.environment.to_dict(), "time_limit": self.time_limit, **seed,
+            "action_shape": list(self.actions.shape),
+            "skills": [{"activation": kind_of(skill.activation), "target": kind_of(skill.target),
+                        "entry": entry_kinds(skill.entry)} for skill in self.skills],
+        }, arrays, [skill.policy for skill in self.skills])
 
     @classmethod
-    def load(cls, folder: str | Path) -> "SkillChain":
+    def load(cls, folder: str | Path, *, trust: bool = False) -> "SkillChain":
         """Read a chain that `save` wrote.
+
+        Args:
+            folder: The folder.
+            trust: Let its environment be made where that imports a module which the folder names.
 
         Raises:
             DamagedFile: a file is missing, truncated, or of another version.
         """
         folder = Path(folder)
-        structure = read_json(folder / "chain.json")
-        if not isinstance(structure, dict) or structure.get("format") != FORMAT:
-            raise DamagedFile(f"{folder / 'chain.json'} is not a skill chain")
-        if structure["version"] != VERSION:
-            raise DamagedFile(f"{folder / 'chain.json'} has version {structure['version']}, expected {VERSION}")
-        arrays = read_arrays(folder / "chain.npz")
-        policies = load_policies(folder / "chain.safetensors", len(structure["skills"]))
+        structure, arrays, policies = read_chain(folder, trust=trust)
         try:
             skills = tuple(
                 Skill(policy, from_arrays(entry["activation"], arrays, f"activation{index}"),
-                      from_arrays(entry["target"], arrays, f"target{index}"))
+                      from_arrays(entry["target"], arrays, f"target{index}"),
+                      entry_from_arrays(entry["entry"], arrays, f"entry{index}"))
                 for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
-            return cls(skills, arrays["start"], EnvSpec.from_dict(structure["environment"]), structure["time_limit"])
-        except (KeyError, ValueError) as error:
+            actions = ActionMap(arrays["first_action"], arrays["last_action"], tuple(structure["action_shape"]))
+            environment = EnvSpec.from_dict(structure["environment"], trusted=trust)
+            return cls(skills, arrays["start"], environment, structure["time_limit"], actions,
+                       structure.get("reset_seed"))
+        except (KeyError, ValueError, TypeError, IndexError) as error:
             raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error
-
-
-class ChainController:
-    """Which skill each execution is in, and what to do there."""
-
-    def __init__(self, chain: SkillChain, model: ResettableModel, count: int):
-        if not chain.skills:
-            raise InvalidOption("the skill chain is empty")
-        self.chain = chain
-        self.model = model
-        self.current = np.zeros(count, dtype=np.int64)
-
-    def act(self, states: Array, members: IndexArray | None = None) -> Array:
-        """Return controls [B, A] for the states [B, D] of the given executions (default: all, in order)."""
-        members = np.arange(len(states)) if members is None else members
-        current = self.current[members]
-        for index in range(1, len(self.chain.skills)):
-            behind = np.flatnonzero(current < index)
-            if len(behind):
-                entered = self.chain.skills[index].activation.contains(self.model, states[behind])
-                current[behind[entered]] = index
-        self.current[members] = current
-        observations = self.model.observe(states)
-        controls = np.empty((len(states), len(self.model.action_low)))
-        for index in np.unique(current):
-            mine = current == index
-            controls[mine] = self.chain.skills[index].policy.act(observations[mine])
-        return controls

@@ -14,7 +14,10 @@ from pbcs_ompl.core.errors import DamagedFile, InvalidOption, UnknownName
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.options import check_names, check_range, check_types
 from pbcs_ompl.core.plain import plain
+from pbcs_ompl.core.trust import is_module_name, module_names, refuse_modules
+from pbcs_ompl.results import schema
 from pbcs_ompl.results.files import read_toml
+from pbcs_ompl.results.schema import check
 from pbcs_ompl.skills.agent_interface import Agent, AgentSettingsValues, load_agent
 from pbcs_ompl.skills.method import TrainingMethod
 from pbcs_ompl.skills.pbcs import PBCS, PBCSSettings
@@ -196,17 +199,33 @@ class TrainConfig:
                                  settings=self.agent_settings, seeds=(seed,), device=self.device)
 
 
-def read_config(path: Path) -> tuple[EnvSpec, TrainConfig, dict[str, str]]:
+def config_modules(values: Mapping[str, Any]) -> list[str]:
+    """Return the names in a config.toml, but for its environment, that import a module."""
+    direct = [values.get("planner"), values.get("agent")]
+    named = [name for name in direct if isinstance(name, str) and is_module_name(name)]
+    return [*named, *module_names([values.get(key) for key in ("planner_kwargs", "agent_settings", "settings")])]
+
+
+def read_config(path: Path, *, trust: bool = False) -> tuple[EnvSpec, TrainConfig, dict[str, str]]:
     """Return what a config.toml holds: the environment, the configuration, and the versions of packages.
+
+    Args:
+        path: The file.
+        trust: Import the modules that it names.
 
     Raises:
         DamagedFile: the file is not that of a training.
+        UntrustedModule: it names a module, and is not trusted.
         UnknownName, InvalidOption: see `TrainConfig.from_dict`.
     """
     values = read_toml(path)
     if values.get("kind") != "train":
         raise DamagedFile(f"{path} is not that of a training: its kind is {values.get('kind')!r}; expected 'train'")
+    check(path, values, schema.TrainConfig)
     try:
-        return EnvSpec.from_dict(values.get("environment")), TrainConfig.from_dict(values), values.get("versions", {})
+        environment = EnvSpec.from_dict(values.get("environment"), trusted=trust)
+        if not trust:
+            refuse_modules(str(path), [*environment.modules, *config_modules(values)])
+        return environment, TrainConfig.from_dict(values), values.get("versions", {})
     except DamagedFile as error:
         raise DamagedFile(f"{path}: {error}") from error

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbcs_ompl.core.interfaces import ResettableModel
-from pbcs_ompl.core.types import Array, BoolArray, IndexArray
+from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
 from pbcs_ompl.skills.activation_sets import Target
 
 Act = Callable[[Array], Array]
@@ -47,7 +47,7 @@ class Episodes:
 
 
 def run_episodes(model: ResettableModel, act: Act, target: Target, starts: Array, *, epsilon: float, max_steps: int,
-                 rng: np.random.Generator, success_reward: float | None) -> Episodes:
+                 rng: np.random.Generator, success_reward: float | None, counter: Counter) -> Episodes:
     """Run one episode from each start state with an epsilon-greedy policy.
 
     Args:
@@ -58,10 +58,14 @@ def run_episodes(model: ResettableModel, act: Act, target: Target, starts: Array
         epsilon: Fraction of random actions.
         max_steps: Length at which an episode ends, in steps.
         rng: Source of random actions.
+        counter: Counts every transition.
         success_reward: The reward for reaching the target, of the shaped reward; None for the environment's own reward.
 
     Source: [Matheron2020] Alg. 8. Differs: the episodes run side by side; each ends when the target is reached, the
     environment ends it, or after `max_steps`.
+
+    Raises:
+        BudgetUsedUp: in the middle of the episodes.
     """
     states = starts.copy()
     alive = np.arange(len(starts))
@@ -71,6 +75,7 @@ def run_episodes(model: ResettableModel, act: Act, target: Target, starts: Array
     for _ in range(max_steps):
         here = states[alive]
         controls = with_random_actions(model, act(here), epsilon, rng)
+        counter.spend(len(alive))
         outcome = model.transition(here, controls)
         success = target.contains(model, outcome.states)
         ended = success | outcome.ended

@@ -1,32 +1,39 @@
-"""How well a skill chain drives its environment."""
+"""How well a controller drives its environment: executions in fresh environments, by the judge."""
 
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import gymnasium
 import numpy as np
 
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.errors import InvalidOption, NotVerified
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.options import check_range
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.statistics import wilson
-from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.judge import Controller, Execution, Judge
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.resettable.task import Task, task_of
 from pbcs_ompl.skills.chain import SkillChain
+
+EPISODE_STEPS = 1000
+"""Length of an episode where neither the controller nor the environment has a limit."""
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Executions of a chain from its start.
+    """Executions of a controller in fresh environments.
 
     Attributes:
-        success_rate: Fraction of the episodes that reached the goal.
+        success_rate: Fraction of the episodes in which the environment granted the goal.
         wilson: Its 95 % Wilson interval.
         episodes: Number of executions.
         steps_median: Median steps of the successful ones; None when there are none.
         epsilon: Fraction of random actions.
+        endings: How many episodes ended for which reason: "goal", "terminated", "truncated", "time limit".
     """
 
     success_rate: float
@@ -34,6 +41,16 @@ class Evaluation:
     episodes: int
     steps_median: float | None
     epsilon: float
+    endings: dict[str, int] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, executions: Sequence[Execution], epsilon: float) -> "Evaluation":
+        """Return the numbers of some executions."""
+        steps = [execution.steps for execution in executions if execution.success]
+        count = len(executions)
+        return cls(len(steps) / count, wilson(len(steps), count), count,
+                   float(np.median(steps)) if steps else None, epsilon,
+                   dict(sorted(Counter(execution.ending for execution in executions).items())))
 
     @property
     def successes(self) -> int:
@@ -43,46 +60,81 @@ class Evaluation:
     def summary(self) -> dict[str, Any]:
         """Return plain values."""
         return {"success_rate": self.success_rate, "wilson": list(self.wilson), "episodes": self.episodes,
-                "steps_median": self.steps_median, "epsilon": self.epsilon}
+                "steps_median": self.steps_median, "epsilon": self.epsilon, "endings": self.endings}
 
 
-def evaluate(controller: SkillChain, env: str | EnvSpec | gymnasium.Env | ResettableModel | None = None, *,
+def evaluate(controller: SkillChain | Controller,
+             env: str | EnvSpec | gymnasium.Env[Any, Any] | ResettableModel | None = None, *,
              env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
-             feature: str | FeatureRule | None = None, start_seed: int | None = None, episodes: int = 100,
+             feature: str | FeatureRule | None = None, start_seed: int | None = None,
+             reset_options: dict[str, Any] | None = None, max_episode_steps: int | None = None, episodes: int = 100,
              epsilon: float = 0.0, seed: int = 0) -> Evaluation:
-    """Execute a skill chain from the state it was trained to start from.
+    """Execute a controller in fresh environments, through `reset` and `step` alone.
 
-    In an environment that draws a new start or goal at each reset, that is one of many: a chain is a controller for
-    one task, robust to disturbances, not a solution of all tasks.
+    A chain starts where it was trained to. In an environment that draws a new start or goal at each reset, that is one
+    of many: a chain is a controller for one task, robust to disturbances, not a solution of all tasks.
 
     Args:
-        controller: The chain, such as `TrainResult.chain` or `SkillChain.load(folder)`.
+        controller: A chain, such as `TrainResult.chain` or `SkillChain.load(folder)`; or any `Controller`, whose
+            episodes have seeds of their own.
         env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model; None for the environment that the
             chain was trained in.
         env_kwargs: Options of the environment, when `env` is an id.
-        goal, feature, start_seed: See `pbcs_ompl.make`.
+        goal, feature, start_seed, reset_options, max_episode_steps: See `pbcs_ompl.make`.
+        episodes: Number of executions.
+        epsilon: Fraction of actions that are replaced by random ones.
+        seed: Of the random actions, and of the resets of a controller that is no chain.
+
+    Raises:
+        InvalidOption: `controller` is none, no episodes, an epsilon outside [0, 1], or options without `env`.
+        Mismatch: the chain was trained in another environment.
+        NotVerified: no fresh environment can be made, or none starts where the chain does.
+        UnknownName, UnsupportedSpace: the environment does not exist, or does not fit.
+        CallbackFailed: the environment raised.
+    """
+    check_range("episodes", episodes, episodes >= 1, "at least 1")
+    check_range("epsilon", epsilon, 0 <= epsilon <= 1, "within [0, 1]")
+    rules: dict[str, Any] = {"goal": goal, "feature": feature, "start_seed": start_seed,
+                             "reset_options": reset_options, "max_episode_steps": max_episode_steps}
+    if env is None and (env_kwargs or any(rule is not None for rule in rules.values())):
+        raise InvalidOption("env is None; expected an environment beside env_kwargs, goal, feature, start_seed, "
+                            "reset_options and max_episode_steps, or none of them, for the environment that the chain "
+                            "was trained in")
+    if isinstance(controller, SkillChain):
+        task = task_of(controller.environment if env is None else env, env_kwargs, **rules)
+        return evaluate_chain(controller, task, episodes=episodes, epsilon=epsilon, seed=seed)
+    if not callable(getattr(controller, "act", None)) or not callable(getattr(controller, "reset", None)):
+        raise InvalidOption(f"controller is {controller!r}; expected a SkillChain, such as train(...).chain or "
+                            "SkillChain.load(folder), or an object with reset(count) and act(observations)")
+    if env is None:
+        raise InvalidOption("env is None; expected the environment that the controller is to drive")
+    task = task_of(env, env_kwargs, **rules)
+    seeds = SeedTree(seed).child("resets")
+    executions = Judge(*task).drive(
+        controller, reset_seeds=[seeds.child(str(k)).integer() for k in range(episodes)],
+        max_steps=task.spec.max_episode_steps or EPISODE_STEPS, epsilon=epsilon, seed=seed)
+    return Evaluation.of(executions, epsilon)
+
+
+def evaluate_chain(chain: SkillChain, task: Task, *, episodes: int, epsilon: float, seed: int) -> Evaluation:
+    """Execute a chain in fresh environments of a task; see `evaluate`.
+
+    Args:
+        chain: The chain.
+        task: Where.
         episodes: Number of executions.
         epsilon: Fraction of actions that are replaced by random ones.
         seed: Of the random actions.
 
     Raises:
-        InvalidOption: `controller` is not a chain, no episodes, an epsilon outside [0, 1], or options without `env`.
         Mismatch: the chain was trained in another environment.
-        UnknownName, NotResettable, UnsupportedSpace: the environment does not exist, or does not fit.
+        NotVerified: no fresh environment can be made, or none starts where the chain does.
+        CallbackFailed: the environment raised.
     """
-    if not isinstance(controller, SkillChain):
-        raise InvalidOption(f"controller is {controller!r}; expected a SkillChain, such as train(...).chain or "
-                            "SkillChain.load(folder)")
-    check_range("episodes", episodes, episodes >= 1, "at least 1")
-    check_range("epsilon", epsilon, 0 <= epsilon <= 1, "within [0, 1]")
-    if env is None and (env_kwargs or goal is not None or feature is not None or start_seed is not None):
-        raise InvalidOption("env is None; expected an environment beside env_kwargs, goal, feature and start_seed, "
-                            "or none of them, for the environment that the chain was trained in")
-    model = make(controller.environment if env is None else env, env_kwargs, goal=goal, feature=feature,
-                 start_seed=start_seed)
-    controller.check_belongs_to(model)
-    starts = np.repeat(controller.start[None], episodes, axis=0)
-    rollouts = controller.rollouts(model, starts, epsilon=epsilon, rng=SeedTree(seed).child("evaluation").generator())
-    successes = int(rollouts.success.sum())
-    steps = float(np.median(rollouts.steps[rollouts.success])) if successes else None
-    return Evaluation(successes / episodes, wilson(successes, episodes), episodes, steps, epsilon)
+    chain.check_belongs_to(task.spec)
+    judge = Judge(*task)
+    if chain.reset_seed is None:
+        raise NotVerified("not verified: the chain was trained from a state that no reset leads to")
+    executions = judge.drive(chain.controller(), reset_seeds=[chain.reset_seed] * episodes, max_steps=chain.time_limit,
+                             epsilon=epsilon, seed=seed)
+    return Evaluation.of(executions, epsilon)

@@ -9,11 +9,15 @@ import numpy as np
 
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.plain import plain
+from pbcs_ompl.results.arrays import NUMBERS, take, take_words
 from pbcs_ompl.results.files import read_arrays, write_arrays
+from pbcs_ompl.results.schema import CheckpointVersion, CheckpointWords
 from pbcs_ompl.skills.chain import Skill
 from pbcs_ompl.skills.trainer import SkillTrainer
 
-VERSION = 3
+VERSION = 4
+WORDS = "__plain__"
+"""The array with the plain values, as JSON."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ class TrainingMethod(Protocol):
 def write_checkpoint(path: Path, snapshot: Snapshot, seconds: float) -> None:
     """Write a snapshot and the seconds of training so far, atomically."""
     text = json.dumps({"version": VERSION, "seconds": seconds, "plain": snapshot.plain}, default=plain)
-    write_arrays(path, __plain__=np.array(text), **snapshot.arrays)
+    write_arrays(path, **{WORDS: np.array(text)}, **snapshot.arrays)
 
 
 def read_checkpoint(path: Path) -> tuple[Snapshot, float]:
@@ -74,11 +78,24 @@ def read_checkpoint(path: Path) -> tuple[Snapshot, float]:
         DamagedFile: the file is missing, truncated, or of another version.
     """
     arrays = read_arrays(path)
-    try:
-        values = json.loads(str(arrays.pop("__plain__")))
-        version = values["version"]
-    except (KeyError, ValueError) as error:
-        raise DamagedFile(f"{path} is not a checkpoint: {error}") from error
+    version = take_words(path, arrays, WORDS, CheckpointVersion, finite=False)["version"]
     if version != VERSION:
         raise DamagedFile(f"{path} has version {version}, expected {VERSION}; train again from scratch")
-    return Snapshot(values["plain"], arrays), values["seconds"]
+    values = take_words(path, arrays, WORDS, CheckpointWords, finite=False)
+    numbers = {name: take(path, arrays, name, array.shape, kinds=NUMBERS, finite=False)
+               for name, array in arrays.items() if name != WORDS}
+    return Snapshot(values["plain"], numbers), values["seconds"]
+
+
+def restore(method: TrainingMethod, path: Path) -> float:
+    """Let a method resume from a checkpoint; return the seconds of training before it.
+
+    Raises:
+        DamagedFile: the file is missing, truncated, of another version, or that of another training.
+    """
+    snapshot, seconds = read_checkpoint(path)
+    try:
+        method.restore(snapshot)
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise DamagedFile(f"{path} is damaged, or that of another training: {error!r}") from error
+    return seconds

@@ -17,6 +17,7 @@ from pbcs_ompl.skills.activation_sets import (
 from pbcs_ompl.skills.backplay import Backplay, SkillSettings
 from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.method import Snapshot
+from pbcs_ompl.skills.observed_sets import Entry, entry_from_arrays, entry_kinds, entry_to_arrays
 from pbcs_ompl.skills.policy import SkillPolicy, policy_from_arrays, policy_to_arrays
 from pbcs_ompl.skills.settings import PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
@@ -61,6 +62,7 @@ class ChainLink(NamedTuple):
     end: int
     policy: SkillPolicy
     activation: ActivationSet
+    entry: Entry
 
 
 class PBCS:
@@ -81,6 +83,7 @@ class PBCS:
         self.links: list[ChainLink] = []
         """From the start to the goal; with a gap while one is being trained."""
         self.verified = not settings.verify_episodes
+        self.metric = trainer.observed_metric()
         self._train_between(0, trainer.waypoints.last)
 
     @property
@@ -96,7 +99,7 @@ class PBCS:
     @property
     def skills(self) -> list[Skill]:
         """The skills so far, in the order of execution."""
-        return [Skill(link.policy, link.activation, self._target_at(link.end)) for link in self.links]
+        return [Skill(link.policy, link.activation, self._target_at(link.end), link.entry) for link in self.links]
 
     @property
     def covered(self) -> float:
@@ -112,7 +115,8 @@ class PBCS:
         self.backplay.step()
         if self.backplay.done and self.backplay.saved_policy is not None:
             start, policy = self.backplay.state.saved, self.backplay.saved_policy
-            self.links.append(ChainLink(start, self.end, policy, self._activation(start, policy)))
+            activation = self._activation(start, policy)
+            self.links.append(ChainLink(start, self.end, policy, activation, self._entry(start, activation)))
             self.links.sort(key=lambda link: link.start)
             self._train_between(self.min_index, start)
 
@@ -129,6 +133,12 @@ class PBCS:
             return self.trainer.waypoints.ball(start)
         return self.trainer.learn_activation(start, policy, self.settings.classifier)
 
+    def _entry(self, start: int, activation: ActivationSet) -> Entry:
+        """Return the same set for observations; the first skill of a chain needs none."""
+        if start == 0:
+            return Entry()
+        return self.trainer.entry(start, activation, self.metric, self.settings.classifier)
+
     def _target_at(self, index: int) -> Target:
         """Return where a skill that ends at waypoint `index` leads: the activation set of the skill from there on."""
         sets: dict[int, Target] = {link.start: link.activation for link in self.links}
@@ -138,11 +148,10 @@ class PBCS:
         trainer, settings = self.trainer, self.settings
         chain = SkillChain.of(self.skills, trainer.waypoints, settings.steps_per_skill)
         starts = np.repeat(trainer.waypoints.states[:1], settings.verify_episodes, axis=0)
-        tried = chain.rollouts(trainer.model, starts[:1])
-        trainer.counter.count += int(tried.steps.sum())
+        tried = chain.rollouts(trainer.model, starts[:1], counter=trainer.counter)
         if tried.success.all():
-            tried = chain.rollouts(trainer.model, starts, epsilon=settings.episodes.epsilon, rng=trainer.rng)
-            trainer.counter.count += int(tried.steps.sum())
+            tried = chain.rollouts(trainer.model, starts, epsilon=settings.episodes.epsilon, rng=trainer.rng,
+                                   counter=trainer.counter)
         self.verified = bool(tried.success.mean() >= settings.verified_rate)
         if not self.verified:
             weakest = self.links.pop(int(np.bincount(tried.skills[~tried.success]).argmax()))
@@ -157,9 +166,10 @@ class PBCS:
         for index, policy in enumerate(policies):
             arrays |= {f"policy{index}.{name}": array for name, array in policy_to_arrays(policy).items()}
         for index, link in enumerate(self.links):
-            arrays |= to_arrays(link.activation, f"activation{index}")
+            arrays |= to_arrays(link.activation, f"activation{index}") | entry_to_arrays(link.entry, f"entry{index}")
         return Snapshot({"trainer": plain,
-                         "links": [[link.start, link.end, kind_of(link.activation)] for link in self.links],
+                         "links": [[link.start, link.end, kind_of(link.activation), entry_kinds(link.entry)]
+                                   for link in self.links],
                          "end": self.end, "min_index": self.min_index, "verified": self.verified,
                          "backplay": self.backplay.to_dict(), "policies": len(policies)}, arrays)
 
@@ -169,11 +179,12 @@ class PBCS:
         policies = [policy_from_arrays({name.partition(".")[2]: array for name, array in snapshot.arrays.items()
                                         if name.startswith(f"policy{index}.")})
                     for index in range(plain["policies"])]
-        self.links = [ChainLink(start, end, policies[index], from_arrays(kind, snapshot.arrays, f"activation{index}"))
-                      for index, (start, end, kind) in enumerate(plain["links"])]
+        self.links = [ChainLink(start, end, policies[index], from_arrays(kind, snapshot.arrays, f"activation{index}"),
+                                entry_from_arrays(kinds, snapshot.arrays, f"entry{index}"))
+                      for index, (start, end, kind, kinds) in enumerate(plain["links"])]
         self.end, self.min_index, self.verified = plain["end"], plain["min_index"], plain["verified"]
         self.trainer.restore(plain["trainer"], {name: array for name, array in snapshot.arrays.items()
-                                                if not name.startswith(("policy", "activation"))})
+                                                if not name.startswith(("policy", "activation", "entry"))})
         self.trainer.set_target(self.trainer.end_index, self._target_at(self.trainer.end_index))
         self.backplay = Backplay(self.trainer, self.settings.skill, self.min_index)
         self.backplay.restore(plain["backplay"],

@@ -9,7 +9,7 @@ import numpy as np
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.errors import DamagedFile, MissingDependency
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.results.files import write_atomically
+from pbcs_ompl.results.files import read_bytes, write_atomically
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def load_policies(path: Path, count: int) -> list[SkillPolicy]:
     """
     _, load = _safetensors()
     try:
-        tensors = load(path.read_bytes())
+        tensors = load(read_bytes(path))
     except FileNotFoundError as error:
         raise DamagedFile(f"{path} does not exist") from error
     except Exception as error:  # safetensors raises its own SafetensorError, which is no public base class
@@ -98,6 +98,8 @@ def load_policies(path: Path, count: int) -> list[SkillPolicy]:
                                     if name.partition(".")[0] == str(index)}) for index in range(count)]
     except KeyError as error:
         raise DamagedFile(f"{path} is damaged: it lacks {error}") from error
+    except DamagedFile as error:
+        raise DamagedFile(f"{path} is damaged: {error}") from error
 
 
 def _safetensors() -> tuple[Callable[..., bytes], Callable[..., dict[str, np.ndarray]]]:

@@ -243,4 +243,4 @@ def read_preset(name: str) -> dict[str, Any]:
     """
     if name not in preset_names():
         raise UnknownName("preset", name, preset_names())
-    return tomllib.loads(files("pbcs_ompl.skills").joinpath(f"{name}.toml").read_text())
+    return tomllib.loads(files("pbcs_ompl.skills").joinpath(f"{name}.toml").read_text("utf-8"))

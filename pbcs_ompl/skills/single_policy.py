@@ -235,7 +235,7 @@ class Bootstrapped(Plain):
         trainer = self.trainer
         count = min(self.settings.prefill_transitions, trainer.counter.left)
         found = explore(trainer.model, count, int(trainer.rng.integers(2**31)))
-        trainer.counter.count += len(found.rewards)
+        trainer.counter.spend(len(found.rewards))
         trainer.add_transitions(found.states, found.controls, found.rewards, found.next_states, found.terminals)
 
 

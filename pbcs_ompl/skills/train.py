@@ -28,7 +28,8 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
           agent_settings: dict[str, Any] | None = None, planner: str | None = None,
           planner_kwargs: dict[str, Any] | None = None, env_kwargs: dict[str, Any] | None = None,
           goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
-          seed: int = 0, max_transitions: int = 10_000_000, device: str = "cpu", out: str | Path | None = None,
+          reset_options: dict[str, Any] | None = None, max_episode_steps: int | None = None, seed: int = 0,
+          max_transitions: int = 10_000_000, device: str = "cpu", out: str | Path | None = None,
           on_progress: ProgressCallback | None = None) -> TrainResult:
     """Plan (unless a trajectory is given) and train skills along the plan.
 
@@ -44,9 +45,9 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         planner: A registered planner, or module:attribute; None for Ex, or where nothing is planned.
         planner_kwargs: Options of the planner.
         env_kwargs: Options of the environment, when `env` is an id.
-        goal, feature, start_seed: See `pbcs_ompl.make`.
+        goal, feature, start_seed, reset_options, max_episode_steps: See `pbcs_ompl.make`.
         seed: Root of all random streams; equal seeds give equal results.
-        max_transitions: Budget of environment steps, planning included.
+        max_transitions: Budget of environment steps, planning included; the executions of the judge do not count.
         device: Where the agent trains, "cpu" or "cuda".
         out: A new folder for config.toml, result.json, trajectory.npz, chain/ and, until the end, checkpoint.npz.
         on_progress: Called after every session and test with plain numbers.
@@ -66,7 +67,8 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         method=method, planner=planner, planner_kwargs=planner_kwargs, agent=agent, preset=preset, settings=settings,
         agent_settings=agent_settings, seed=seed, max_transitions=max_transitions, device=device,
         planned=trajectory is not None)
-    model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
+    model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options,
+                 max_episode_steps=max_episode_steps)
     if trajectory is not None:
         trajectory.check_belongs_to(model)
     if planner is not None or planner_kwargs:
@@ -77,7 +79,7 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         return Training(model, config, folder, on_progress, False).run(trajectory)
 
 
-def resume(folder: str | Path, *, max_transitions: int | None = None,
+def resume(folder: str | Path, *, max_transitions: int | None = None, trust: bool = False,
            on_progress: ProgressCallback | None = None) -> TrainResult:
     """Continue an interrupted training; the result is that of an uninterrupted one, bit for bit.
 
@@ -87,16 +89,19 @@ def resume(folder: str | Path, *, max_transitions: int | None = None,
     Args:
         folder: The `out` of the training.
         max_transitions: A new budget, for a training that has used up its own.
+        trust: Import the modules that the folder names, such as an agent `module:Class`. Say so only of a folder whose
+            author you trust: they run.
         on_progress: Called after every session and test with plain numbers.
 
     Raises:
         RunFolderError: there is nothing to resume, or another process uses the folder.
         DamagedFile: a file in the folder is damaged.
+        UntrustedModule: the folder names a module, and is not trusted.
     """
     with RunFolder(folder, resume=True) as opened:
         if (opened.path / RESULT).is_file() and not (opened.path / CHECKPOINT).is_file():
             raise RunFolderError(f"the training in {opened.path} has ended; there is nothing to resume")
-        environment, config, versions = read_config(opened.path / CONFIG)
+        environment, config, versions = read_config(opened.path / CONFIG, trust=trust)
         _warn_of_other_versions(opened.path, versions)
         if max_transitions is not None:
             config = replace(config, max_transitions=max_transitions)

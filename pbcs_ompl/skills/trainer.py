@@ -7,13 +7,17 @@ import numpy as np
 
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
-from pbcs_ompl.skills.activation_sets import ClassifierSet, ClassifierSettings, Target, learn_set
+from pbcs_ompl.skills.activation_sets import ActivationSet, ClassifierSet, ClassifierSettings, Target, learn_set
 from pbcs_ompl.skills.agent_interface import Agent
 from pbcs_ompl.skills.chain import Skill
 from pbcs_ompl.skills.episodes import Act, Episodes, run_episodes
+from pbcs_ompl.skills.observed_sets import Entry, ObservedClassifier, observed_ball, observed_metric
 from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
 from pbcs_ompl.skills.settings import EpisodeSettings
 from pbcs_ompl.skills.waypoints import Waypoints
+
+METRIC_SAMPLES = 100
+"""Waypoints, and states near them, at which distances are compared with observations."""
 
 
 class SkillTrainer:
@@ -132,7 +136,45 @@ class SkillTrainer:
 
     def skill(self, start_index: int, policy: SkillPolicy) -> Skill:
         """Return `policy` as a skill that starts in the ball of `start_index` and leads to the present target."""
-        return Skill(policy, self.waypoints.ball(start_index), self.target)
+        return Skill(policy, self.waypoints.ball(start_index), self.target, Entry())
+
+    def observed_metric(self) -> Array | None:
+        """Return the distance of states as weights of observations, if observations show it (`observed_metric`)."""
+        waypoints, rng = self.waypoints, np.random.default_rng(0)
+        some = np.linspace(0, waypoints.last, METRIC_SAMPLES).astype(np.int64)
+        states = np.concatenate([waypoints.states[np.unique(some)], waypoints.draw_starts(some, rng, self.counter)])
+        return observed_metric(self.model, states, waypoints.starts.radius)
+
+    def entry(self, start_index: int, activation: ActivationSet, metric: Array | None,
+              settings: ClassifierSettings) -> Entry:
+        """Return an activation set as a set of observations.
+
+        Where the observation shows what the distance is made of, that is a ball, with the network of a learnt set. Else
+        a network learns to tell the states of the set from others along the plan.
+
+        Args:
+            start_index: The waypoint in its middle.
+            activation: The set of states.
+            metric: See `observed_metric`.
+            settings: Number of samples, size and training of the network.
+        """
+        if metric is None:
+            return Entry((self._learn_membership(start_index, activation, settings),))
+        if isinstance(activation, ClassifierSet):
+            reach = activation.reach * activation.radius
+            around = observed_ball(self.model, activation.center, reach, metric)
+            return Entry((around, ObservedClassifier.of(activation)))
+        return Entry((observed_ball(self.model, activation.center, activation.radius, metric),))
+
+    def _learn_membership(self, start_index: int, activation: ActivationSet,
+                          settings: ClassifierSettings) -> ObservedClassifier:
+        waypoints, rng = self.waypoints, self.rng
+        around = np.concatenate([np.full(settings.samples, start_index),
+                                 rng.integers(0, waypoints.last + 1, settings.samples)])
+        states = np.concatenate([waypoints.states, waypoints.draw_starts(around, rng, self.counter)])
+        learnt = learn_set(self.model.observe(states), activation.contains(self.model, states),
+                           waypoints.ball(start_index), settings, int(rng.integers(2**31)))
+        return ObservedClassifier.of(learnt)
 
     def policy(self) -> SkillPolicy:
         """Return a snapshot of the agent's policy."""
@@ -161,10 +203,9 @@ class SkillTrainer:
 
     def _run(self, act: Act, starts: Array, epsilon: float) -> Episodes:
         settings = self.settings
-        episodes = run_episodes(self.model, act, self.target, starts, epsilon=epsilon, max_steps=settings.max_steps,
-                                rng=self.rng, success_reward=settings.success_reward if settings.shaped else None)
-        self.counter.count += episodes.transitions
-        return episodes
+        return run_episodes(self.model, act, self.target, starts, epsilon=epsilon, max_steps=settings.max_steps,
+                            rng=self.rng, success_reward=settings.success_reward if settings.shaped else None,
+                            counter=self.counter)
 
     def _train(self, transitions: int) -> None:
         self.updates_due += transitions * self.settings.updates_per_transition

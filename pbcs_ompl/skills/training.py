@@ -1,35 +1,39 @@
 """One training: plan, train skills along the plan, evaluate; it can be stopped and resumed after every step."""
 
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from pbcs_ompl.agents.update import one_thread
 from pbcs_ompl.bridge.plan import plan
-from pbcs_ompl.bridge.termination import interruptible
 from pbcs_ompl.bridge.trajectory import Trajectory
-from pbcs_ompl.core.errors import CallbackFailed, Mismatch, PbcsError
+from pbcs_ompl.bridge.verification import verify
+from pbcs_ompl.core.callbacks import code_of_others
+from pbcs_ompl.core.errors import BudgetUsedUp, Mismatch, NotVerified
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.core.signals import interruptible
 from pbcs_ompl.core.types import Array, Counter, ProgressCallback
+from pbcs_ompl.resettable.task import Task
 from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, read_json, read_toml, write_json
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.results.provenance import planning_versions
+from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.config import METHODS, TrainConfig
-from pbcs_ompl.skills.evaluation import Evaluation, evaluate
+from pbcs_ompl.skills.evaluation import Evaluation, evaluate_chain
 from pbcs_ompl.skills.method import TrainingMethod, read_checkpoint, write_checkpoint
 from pbcs_ompl.skills.settings import CriterionSettings, PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
 
-CHECKPOINT_SECONDS = 30.0
-"""Wall time between checkpoints; it does not change the result."""
+FIRST_CHECKPOINT_SECONDS, CHECKPOINT_SECONDS = 3.0, 30.0
+"""Wall time to the first checkpoint and between later ones; it does not change the result."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +41,14 @@ class TrainResult:
     """The result of a training with its evidence.
 
     Attributes:
-        solved: The chain reaches the goal from the start without noise, and in at least 95 of 100 executions in
-            which a tenth of the actions is random (see `CriterionSettings`).
+        solved: In fresh environments, the chain reaches the goal from the start without noise, and in at least 95 of
+            100 executions in which a tenth of the actions is random (see `CriterionSettings`).
         reason: Why it is not solved; None when it is.
         complete: Whether the method ended by itself; False when its budget or the planner's search ended first.
-        nominal, robust: The two evaluations that decide `solved`; None when training is not complete.
+        nominal, robust: The two evaluations that decide `solved`; None when training is not complete, or they cannot be
+            made (see `NotVerified`).
+        model_success_rate: Success rate of the noisy executions in the model that the chain was trained in; None where
+            `robust` is.
         chain: The skills; None when there are none.
         trajectory: The plan; None for methods without one, or when none was found.
         waypoints: The states along which skills were trained [N+1, D]; None without a plan.
@@ -57,6 +64,7 @@ class TrainResult:
     complete: bool
     nominal: Evaluation | None
     robust: Evaluation | None
+    model_success_rate: float | None
     chain: SkillChain | None
     trajectory: Trajectory | None
     waypoints: Array | None
@@ -73,6 +81,7 @@ class TrainResult:
         return {"solved": self.solved, "reason": self.reason, "complete": self.complete,
                 "success_rate": robust.success_rate if robust else 0.0,
                 "wilson": list(robust.wilson) if robust else None,
+                "model_success_rate": self.model_success_rate,
                 "nominal_success_rate": nominal.success_rate if nominal else 0.0,
                 "steps_median": nominal.steps_median if nominal else None,
                 "skills": len(self.chain.skills) if self.chain else 0,
@@ -99,7 +108,10 @@ class Training:
         self.resumed = resumed
         self.settings = config.settings
         self.seeds = SeedTree(config.seed)
-        self.began = self.last_checkpoint = time.perf_counter()
+        self.began = time.perf_counter()
+        self.next_checkpoint = self.began + FIRST_CHECKPOINT_SECONDS
+        self.undone = 0
+        """Transitions of a step that was undone because the budget ended in it."""
 
     def run(self, trajectory: Trajectory | None) -> TrainResult:
         """Plan (or take the plan that is given or was made before), train, evaluate and write."""
@@ -110,51 +122,65 @@ class Training:
         if self.folder and not self.resumed:
             self.folder.write_config({"kind": "train", **self.config.to_dict(),
                                       "environment": self.model.spec.to_dict(), "versions": training_versions()})
-        trajectory, planned = self._plan(trajectory)
-        if trajectory is None and isinstance(self.settings, PlannedSettings):
-            return self._finish(None, None, planned, "the planner found no path to the goal within the budget")
-        method = self._method(trajectory, planned)
+        trajectory, planned, failure = self._plan(trajectory)
+        if failure is not None and isinstance(self.settings, PlannedSettings):
+            return self._finish(None, trajectory, planned, failure)
+        if trajectory is not None and not trajectory.length:
+            return self._finish(None, trajectory, planned, None)
+        try:
+            method = self._method(trajectory, planned)
+        except BudgetUsedUp:
+            return self._finish(None, trajectory, planned, "the budget is used up before training begins")
         return self._finish(method, trajectory, planned, self._train(method))
 
-    def _plan(self, trajectory: Trajectory | None) -> tuple[Trajectory | None, int]:
-        """Return the plan and the transitions it took."""
+    def _plan(self, trajectory: Trajectory | None) -> tuple[Trajectory | None, int, str | None]:
+        """Return the plan, the transitions it took, and why there is none to train along."""
         if self.path and self.resumed and (self.path / PLAN).is_file():
             trajectory = Trajectory.load(self.path / TRAJECTORY)
             self._check_replays(trajectory)
-            return trajectory, read_json(self.path / PLAN)["transitions"]
-        transitions = 0
+            return trajectory, read_json(self.path / PLAN, PlanEffort)["transitions"], None
         if self.config.planner is not None:
-            found = plan(self.model, self.config.planner, planner_kwargs=self.config.planner_kwargs,
-                         seed=self.seeds.child("plan").integer(), max_transitions=self.config.max_transitions,
-                         on_progress=self._report_planning)
-            trajectory, transitions = found.trajectory, found.transitions
-            if trajectory is not None and not trajectory.length:
-                raise Mismatch("the start is in the goal, so there is nothing to train")
-            if self.folder:
-                config = read_toml(self.folder.path / CONFIG)
-                self.folder.write_config(config | {"planner_kwargs": found.planner_settings})
-        elif trajectory is not None:
+            return self._search()
+        if trajectory is not None:
             self._check_replays(trajectory)
-            if not self._reaches_goal(trajectory):
-                raise Mismatch("the trajectory does not end in the environment's goal")
-        if self.path and trajectory is not None:
+            self._keep_plan(trajectory, 0)
+        return trajectory, 0, None
+
+    def _search(self) -> tuple[Trajectory | None, int, str | None]:
+        found = plan(self.model, self.config.planner, planner_kwargs=self.config.planner_kwargs,
+                     seed=self.seeds.child("plan").integer(), max_transitions=self.config.max_transitions,
+                     on_progress=self._report_planning)
+        if self.folder:
+            config = read_toml(self.folder.path / CONFIG)
+            self.folder.write_config(config | {"planner_kwargs": found.planner_settings})
+        unverified = found.found and found.replay_ok is None
+        if not (found.solved or unverified):
+            reason = found.reason if found.found else "the planner found no path to the goal within the budget"
+            return None, found.transitions, reason
+        if found.trajectory is not None:
+            self._keep_plan(found.trajectory, found.transitions)
+        return found.trajectory, found.transitions, None
+
+    def _keep_plan(self, trajectory: Trajectory, transitions: int) -> None:
+        if self.path:
             trajectory.save(self.path / TRAJECTORY)
             write_json(self.path / PLAN, {"transitions": transitions})
-        return trajectory, transitions
 
     def _check_replays(self, trajectory: Trajectory) -> None:
-        """Refuse a trajectory of another environment; the replay also visits its states, where only those are restored.
+        """Refuse a trajectory that is not true here; the replay also visits its states, where only those are restored.
 
         Raises:
-            Mismatch: it belongs to another environment, or leads elsewhere in this one.
+            Mismatch: it belongs to another environment, leads elsewhere in this one, or does not reach the goal.
         """
         trajectory.check_belongs_to(self.model)
-        if not trajectory.length:
-            raise Mismatch("the trajectory has no steps: the start is in the goal, so there is nothing to train")
-        with _named_failures("replaying the trajectory"):
+        with code_of_others("the environment, while the trajectory was replayed,"):
             same = trajectory.replays_exactly(self.model)
         if not same:
             raise Mismatch("the trajectory does not replay in this environment: its actions lead to other states")
+        verdict = verify(trajectory, self.model)
+        unverified = verdict.replays is None
+        if not verdict.solved and not (unverified and self._reaches_goal(trajectory)):
+            raise Mismatch(f"the trajectory does not end in the environment's goal: {verdict.reason}")
 
     def _reaches_goal(self, trajectory: Trajectory) -> bool:
         return bool(self.model.goal_distance(trajectory.states[-1:])[0] < self.model.goal_threshold)
@@ -173,51 +199,87 @@ class Training:
 
     def _waypoints(self, trajectory: Trajectory | None) -> Waypoints:
         if isinstance(self.settings, PlannedSettings) and trajectory is not None:
-            return Waypoints.of_plan(trajectory.states, self.model, self.settings)
-        return Waypoints.at_start(self.model.initial_state(self.config.seed), self.model, self.settings.starts)
+            return Waypoints.of_plan(trajectory.states, self.model, self.settings, trajectory.reset_seed)
+        return Waypoints.at_start(self.config.seed, self.model, self.settings.starts)
 
     def _train(self, method: TrainingMethod) -> str | None:
         """Step until the method is done; return why it ended early, or None."""
-        stop = threading.Event()
-        with interruptible(stop.set):
+        stops: list[KeyboardInterrupt] = []
+        with interruptible(stops.append):
             while not method.done:
-                if method.trainer.counter.left <= 0:
+                if not self._step(method):
                     self._checkpoint(method)
                     return (f"the budget of {self.config.max_transitions} transitions is used up, with "
                             f"{method.covered:.0%} of the plan covered")
-                with _named_failures("training"):
-                    method.step()
                 self._report(method)
-                if stop.is_set() or time.perf_counter() - self.last_checkpoint > CHECKPOINT_SECONDS:
+                if stops or time.perf_counter() > self.next_checkpoint:
                     self._checkpoint(method)
-                if stop.is_set():
-                    raise KeyboardInterrupt
+                if stops:
+                    raise stops[0]
         return None
+
+    def _step(self, method: TrainingMethod) -> bool:
+        """Make one step of the method; return whether the budget allowed it.
+
+        A step that needs more than is left is undone, so that a training that is resumed with a larger budget does what
+        it would have done with that budget from the beginning.
+        """
+        counter, episodes = method.trainer.counter, self.settings.episodes
+        before = None
+        if counter.left < 2 * episodes.beta * episodes.max_steps or method.covered >= 1.0:
+            before = deepcopy(method.snapshot())
+        try:
+            with code_of_others("the environment or the agent"):
+                if counter.left > 0:
+                    method.step()
+                    return True
+        except BudgetUsedUp:
+            self.undone = counter.count
+            if before is not None:
+                method.restore(before)
+            self.undone -= counter.count
+        return False
 
     def _checkpoint(self, method: TrainingMethod) -> None:
         if self.path:
             write_checkpoint(self.path / CHECKPOINT, method.snapshot(), time.perf_counter() - self.began)
-        self.last_checkpoint = time.perf_counter()
+        self.next_checkpoint = time.perf_counter() + CHECKPOINT_SECONDS
 
     def _finish(self, method: TrainingMethod | None, trajectory: Trajectory | None, planned: int,
                 ended_early: str | None) -> TrainResult:
-        seconds, criterion = time.perf_counter() - self.began, self.settings.criterion
-        chain = nominal = robust = None
+        seconds = time.perf_counter() - self.began
+        chain = None
         if method is not None and method.skills:
             chain = SkillChain.of(method.skills, method.trainer.waypoints, self.settings.steps_per_skill)
-        if chain is not None and ended_early is None:
-            nominal = evaluate(chain, self.model, episodes=1, seed=self.config.seed)
-            robust = evaluate(chain, self.model, episodes=criterion.robust_episodes, epsilon=criterion.robust_epsilon,
-                              seed=self.config.seed)
-        reason = ended_early or _failure(nominal, robust, criterion)
+        outcome = _Outcome(ended_early, None, None, None) if ended_early else self._judge(chain, trajectory)
         result = TrainResult(
-            solved=reason is None, reason=reason, complete=ended_early is None, nominal=nominal, robust=robust,
-            chain=chain, trajectory=trajectory, waypoints=method.trainer.waypoints.states if method else None,
-            plan_transitions=planned, train_transitions=method.trainer.counter.count if method else 0,
+            solved=outcome.reason is None, reason=outcome.reason, complete=ended_early is None, nominal=outcome.nominal,
+            robust=outcome.robust, model_success_rate=outcome.model_success_rate, chain=chain, trajectory=trajectory,
+            waypoints=method.trainer.waypoints.states if method else None, plan_transitions=planned,
+            train_transitions=method.trainer.counter.count + self.undone if method else 0,
             updates=method.trainer.updates if method else 0, seconds=seconds, seed=self.config.seed,
             out=str(self.path) if self.path else None)
         self._write(result)
         return result
+
+    def _judge(self, chain: SkillChain | None, trajectory: Trajectory | None) -> "_Outcome":
+        """Execute a complete chain in fresh environments; without a chain, nothing has to be done in them."""
+        criterion, seed = self.settings.criterion, self.config.seed
+        task = Task(self.model.spec, self.model.make_env)
+        if chain is None:
+            done = trajectory is not None and not trajectory.length and verify(trajectory, self.model).solved
+            return _Outcome(None if done else "there is no skill", None, None, None)
+        try:
+            nominal = evaluate_chain(chain, task, episodes=1, epsilon=0.0, seed=seed)
+            robust = evaluate_chain(chain, task, episodes=criterion.robust_episodes, epsilon=criterion.robust_epsilon,
+                                    seed=seed)
+        except NotVerified as error:
+            return _Outcome(str(error), None, None, None)
+        starts = np.repeat(chain.start[None], criterion.robust_episodes, axis=0)
+        believed = chain.rollouts(self.model, starts, epsilon=criterion.robust_epsilon,
+                                  rng=self.seeds.child("model evaluation").generator())
+        rate = float(believed.success.mean())
+        return _Outcome(_failure(nominal, robust, rate, criterion), nominal, robust, rate)
 
     def _write(self, result: TrainResult) -> None:
         if self.folder is None:
@@ -238,23 +300,13 @@ class Training:
             return
         trainer = method.trainer
         try:
-            self.on_progress({"phase": "train", "transitions": trainer.counter.count, "updates": trainer.updates,
-                              "covered": method.covered, "skills": len(method.skills),
-                              "seconds": time.perf_counter() - self.began})
+            with code_of_others("on_progress"):
+                self.on_progress({"phase": "train", "transitions": trainer.counter.count, "updates": trainer.updates,
+                                  "covered": method.covered, "skills": len(method.skills),
+                                  "seconds": time.perf_counter() - self.began})
         except KeyboardInterrupt:  # a caller may end a training from here
             self._checkpoint(method)
             raise
-
-
-@contextmanager
-def _named_failures(doing: str) -> Iterator[None]:
-    """Turn an exception of the environment or of the agent into a CallbackFailed."""
-    try:
-        yield
-    except PbcsError:
-        raise
-    except Exception as error:
-        raise CallbackFailed(f"the environment or the agent raised while {doing}: {error!r}") from error
 
 
 def training_versions() -> dict[str, str]:
@@ -262,13 +314,26 @@ def training_versions() -> dict[str, str]:
     return planning_versions() | {"torch": version("torch")}
 
 
-def _failure(nominal: Evaluation | None, robust: Evaluation | None, criterion: CriterionSettings) -> str | None:
+class _Outcome(NamedTuple):
+    """What a training came to: why it is not solved, what the judge found, and what the model says."""
+
+    reason: str | None
+    nominal: Evaluation | None
+    robust: Evaluation | None
+    model_success_rate: float | None
+
+
+def _failure(nominal: Evaluation, robust: Evaluation, believed: float, criterion: CriterionSettings) -> str | None:
     """Return why a complete training does not meet the criterion of a solved one; None when it does."""
-    if nominal is None or robust is None:
-        return "there is no skill"
+    if nominal.success_rate == 1 and robust.success_rate >= criterion.robust_rate:
+        return None
     if nominal.success_rate < 1:
-        return "the chain does not reach the goal without noise"
-    if robust.success_rate < criterion.robust_rate:
-        return (f"{robust.successes} of {robust.episodes} executions with {robust.epsilon:.0%} random actions succeed, "
-                f"expected {criterion.robust_rate:.0%}")
-    return None
+        ending = next(iter(nominal.endings))
+        found = f"the chain does not reach the goal without noise (the episode ended: {ending})"
+    else:
+        found = (f"{robust.successes} of {robust.episodes} executions with {robust.epsilon:.0%} random actions "
+                 f"succeed, expected {criterion.robust_rate:.0%}")
+    if robust.wilson[1] < believed:
+        found += (f"; in the model that it was trained in {believed:.0%} succeed, so the model is not true to the "
+                  f"environment: run pbcs doctor")
+    return found

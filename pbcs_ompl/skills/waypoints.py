@@ -19,25 +19,36 @@ class Waypoints:
         states: [N+1, D].
         model: The environment they belong to.
         starts: Radius of the balls around them, and how states are drawn there.
+        reset_seed: The seed of the reset that leads to the first of them; None where none is known to.
         plan: How policies observe the world along them; the default is that of methods without a plan.
     """
 
     states: Array
     model: ResettableModel
     starts: StartSettings
+    reset_seed: int | None = None
     plan: PlanSettings = field(default_factory=PlanSettings)
 
     @classmethod
-    def of_plan(cls, states: Array, model: ResettableModel, settings: PlannedSettings) -> "Waypoints":
-        """Return the waypoints along the `states` [T+1, D] of a plan, without loops if the settings say so."""
+    def of_plan(cls, states: Array, model: ResettableModel, settings: PlannedSettings,
+                reset_seed: int | None = None) -> "Waypoints":
+        """Return the waypoints along a plan, without loops if the settings say so.
+
+        Args:
+            states: Those of the plan [T+1, D].
+            model: The environment.
+            settings: Of the method.
+            reset_seed: The seed of the reset that leads to the first state.
+        """
         if settings.plan.remove_loops and len(states) > 2:
             states = states[remove_loops(model, states, settings.starts.radius)]
-        return cls(states, model, settings.starts, settings.plan)
+        return cls(states, model, settings.starts, reset_seed, settings.plan)
 
     @classmethod
-    def at_start(cls, start: Array, model: ResettableModel, settings: StartSettings) -> "Waypoints":
-        """Return the waypoints of a method without a plan: the start state [D], as first and as last one."""
-        return cls(np.stack([start, start]), model, settings)
+    def at_start(cls, seed: int, model: ResettableModel, settings: StartSettings) -> "Waypoints":
+        """Return the waypoints of a method without a plan: the start of an episode with `seed`, as first and last."""
+        start = model.initial_state(seed)
+        return cls(np.stack([start, start]), model, settings, model.spec.reset_seed(seed))
 
     @property
     def last(self) -> int:

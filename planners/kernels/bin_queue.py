@@ -9,9 +9,10 @@ another bin.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numpy.typing import NDArray
 
+from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import GROWTH, resized_copy
 from pbcs_ompl.planners.kernels.runs import LENGTH, LOWEST, MEMBER, SIZE, START, Number, append, choose
 
@@ -83,7 +84,7 @@ def insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool
     return queue
 
 
-@njit(cache=True)
+@njit()
 def select(queue: BinQueue, uniforms: NDArray[np.float64], nodes: NDArray[np.int64]) -> None:
     """Write into `nodes` [B] as many selections in a row, by numbers uniform in [0, 1) [B, 2]: bin, node."""
     pool, heads, order, head = queue.pool, queue.heads, queue.order, queue.head
@@ -96,7 +97,7 @@ def tied_bins(queue: BinQueue) -> int:
     return int(queue.head[0, LENGTH] - queue.head[0, LOWEST])
 
 
-@njit(cache=True)
+@njit()
 def cell_of(features: NDArray[np.float64], row: int, size: NDArray[np.float64],
             cell: NDArray[np.int64]) -> None:
     """Write the coordinates floor(feature / size) of features[row] into `cell` [F]."""
@@ -104,7 +105,7 @@ def cell_of(features: NDArray[np.float64], row: int, size: NDArray[np.float64],
         cell[axis] = int(min(max(np.floor(features[row, axis] / size[axis]), -FARTHEST), FARTHEST))
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[np.int64]) -> Number:
     """Return the position in `table` of a cell [F], or of the empty place where it belongs."""
     mixed = np.uint64(0)
@@ -122,7 +123,7 @@ def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[
     return place
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def add(pool: NDArray[np.int32], heads: NDArray[np.int32], number: Number, node: Number) -> bool:
     """Add a node of count 0 to a bin; return False where the bin is full, or there is none (number -1)."""
     if number < 0 or heads[number, LENGTH] == 1 << heads[number, SIZE]:
@@ -131,7 +132,7 @@ def add(pool: NDArray[np.int32], heads: NDArray[np.int32], number: Number, node:
     return True
 
 
-@njit(cache=True)
+@njit()
 def grow_and_add(queue: BinQueue, cell: NDArray[np.int64], place: Number, node: Number) -> bool:
     """Add a node where `add` could not: open its bin, or double it. Return False where an array is full."""
     number: Number = np.int64(queue.table[place]) - 1
@@ -144,7 +145,7 @@ def grow_and_add(queue: BinQueue, cell: NDArray[np.int64], place: Number, node: 
     return add(queue.pool, queue.heads, number, node)
 
 
-@njit(cache=True)
+@njit()
 def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_],
             size: NDArray[np.float64], first: int, done: int) -> int:
     """Insert from position `done` on; return where an array was full."""
@@ -161,7 +162,7 @@ def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.boo
     return done
 
 
-@njit(cache=True)
+@njit()
 def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: Number) -> Number:
     """Open a bin at a place of the hash table; return -1 if there is no space for one."""
     number = np.int64(queue.head[0, LENGTH])
@@ -179,7 +180,7 @@ def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: Number) -> Number:
     return number
 
 
-@njit(cache=True)
+@njit()
 def _double(queue: BinQueue, number: Number) -> bool:
     """Move a full bin to a slice of twice the size; return whether there was space."""
     pool, heads, free = queue.pool, queue.heads, queue.free
@@ -196,7 +197,7 @@ def _double(queue: BinQueue, number: Number) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit()
 def _take(pool: NDArray[np.int32], free: NDArray[np.int32], used: NDArray[np.int64], size: Number) -> Number:
     """Return the first row of a slice of 2**size rows, or -1."""
     start: Number = np.int64(free[size])
@@ -225,7 +226,7 @@ def _grow(queue: BinQueue) -> BinQueue:
     return queue._replace(pool=resized_copy(queue.pool, rows, max(GROWTH * len(queue.pool), rows + largest)))
 
 
-@njit(cache=True)
+@njit()
 def _rehash(cells: NDArray[np.int64], table: NDArray[np.int32], bins: int) -> None:
     for number in range(bins):
         table[find_cell(cells, table, cells[number])] = number + 1

@@ -4,10 +4,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.compiled import STEP_TYPE
@@ -44,7 +45,7 @@ def prefetch(typing_context: Any, array: Any, row: Any) -> Any:
     return signature, generate
 
 
-@njit(cache=True)
+@njit()
 def _finite(states: Array, row: int) -> bool:
     total = 0.0
     for axis in range(states.shape[1]):
@@ -54,7 +55,7 @@ def _finite(states: Array, row: int) -> bool:
 
 @njit(types.UniTuple(types.int64, 2)(
     STEP_TYPE, types.Tuple((_vector, _matrix, _integers)), _integers, _matrix, COLUMNS_TYPE, types.int64,
-    QUEUE_TYPE, _vector, _matrix), cache=True)
+    QUEUE_TYPE, _vector, _matrix))
 def expand(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
            columns: Columns, first: int, queue: BinQueue, bin_size: Array, uniforms: Array) -> tuple[int, int]:
     """Expand a node for each row of `uniforms` [B, 2 + A] (bin, node, control); new nodes begin at `first`.

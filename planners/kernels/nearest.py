@@ -8,9 +8,9 @@ degenerates the trees, as it does a k-d tree that grows at its leaves ([Matheron
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array, IndexArray
 
 Items = NDArray[np.int32]
@@ -18,7 +18,7 @@ LEAF = 32
 DEPTH = 64
 
 
-@njit(cache=True)
+@njit()
 def insert(points: Array, items: Items, size: int, item: int) -> int:
     """Add row `item` of points [N, F] as entry number `size` of items [R]; return the new size."""
     items[size] = item
@@ -28,7 +28,7 @@ def insert(points: Array, items: Items, size: int, item: int) -> int:
     return size
 
 
-@njit(cache=True)
+@njit()
 def nearest(points: Array, items: Items, size: int, targets: Array, found: IndexArray) -> None:
     """Write into found [B] the items whose points are nearest to targets [B, F], of `size` > 0 items."""
     stack = np.empty((DEPTH, 3), np.int64)
@@ -46,7 +46,7 @@ def nearest(points: Array, items: Items, size: int, targets: Array, found: Index
         found[row] = best
 
 
-@njit(cache=True)
+@njit()
 def _highest_bit(number: int) -> int:
     bit = 1
     while 2 * bit <= number:
@@ -54,7 +54,7 @@ def _highest_bit(number: int) -> int:
     return bit
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _scan(points: Array, items: Items, low: int, high: int, targets: Array, row: int,
           best: int, best_squared: float) -> tuple[int, float]:
     for place in range(low, high):
@@ -67,7 +67,7 @@ def _scan(points: Array, items: Items, low: int, high: int, targets: Array, row:
     return best, best_squared
 
 
-@njit(cache=True)
+@njit()
 def _search(points: Array, items: Items, low: int, high: int, targets: Array, row: int,
             best: int, best_squared: float, stack: IndexArray, gaps: Array) -> tuple[int, float]:
     """Search one k-d tree; keep on the stack the farther halves with the squared gap to their plane."""
@@ -98,7 +98,7 @@ def _search(points: Array, items: Items, low: int, high: int, targets: Array, ro
     return best, best_squared
 
 
-@njit(cache=True)
+@njit()
 def _build(points: Array, items: Items, low: int, high: int) -> None:
     """Arrange items[low:high] as an implicit k-d tree, each range around the median of its axis."""
     stack = np.empty((DEPTH, 3), np.int64)
@@ -116,7 +116,7 @@ def _build(points: Array, items: Items, low: int, high: int) -> None:
             high = middle
 
 
-@njit(cache=True)
+@njit()
 def _place_median(points: Array, items: Items, low: int, high: int, middle: int, axis: int) -> None:
     """Move the item that belongs at `middle` there, smaller ones before it, larger ones behind (Hoare)."""
     last = high - 1

@@ -10,8 +10,9 @@ then is the end of the run before.
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pbcs_ompl.core.compiled import njit
 
 MEMBER, COUNT, RUN = 0, 1, 2  # columns of `entries`
 START, LENGTH, LOWEST, SIZE = 0, 1, 2, 3  # columns of `heads`; SIZE (log2 of the space) is for the owner
@@ -19,7 +20,7 @@ Rows = NDArray[np.int32]
 Number = int | np.integer[Any]
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def append(entries: Rows, heads: Rows, queue: Number, member: Number) -> None:
     """Write a member of count 0 behind those of the queue heads[queue]; there must be space."""
     length = heads[queue, LENGTH]
@@ -34,7 +35,7 @@ def append(entries: Rows, heads: Rows, queue: Number, member: Number) -> None:
     heads[queue, LENGTH] = length + 1
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def choose(entries: Rows, heads: Rows, queue: Number, uniform: float) -> Number:
     """Return a random member of the lowest run, by a number uniform in [0, 1), and raise its count by one.
 
@@ -57,7 +58,7 @@ def choose(entries: Rows, heads: Rows, queue: Number, uniform: float) -> Number:
     return member
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def peek(heads: Rows, queue: Number, uniform: float) -> Number:
     """Return the row of the member that `choose` would return."""
     length, first = heads[queue, LENGTH], heads[queue, LOWEST]

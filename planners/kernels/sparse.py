@@ -1,14 +1,14 @@
 """Random nodes of sparse regions, from the bins of a BinQueue."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.planners.kernels.bin_queue import BinQueue, find_cell
 from pbcs_ompl.planners.kernels.runs import LENGTH, MEMBER, START
 
 
-@njit(cache=True)
+@njit()
 def draw_sparse(queue: BinQueue, reach: int, rng: np.random.Generator, nodes: NDArray[np.int64]) -> None:
     """Write into nodes [B] independent draws with probability proportional to 1 / (nodes in the bins around).
 
@@ -26,7 +26,7 @@ def draw_sparse(queue: BinQueue, reach: int, rng: np.random.Generator, nodes: ND
         nodes[row] = queue.pool[queue.heads[number, START] + int(rng.random() * inside), MEMBER]
 
 
-@njit(cache=True)
+@njit()
 def _around(queue: BinQueue, number: int, reach: int, cell: NDArray[np.int64]) -> int:
     """Return how many nodes are in the bins around one, itself included."""
     axes = len(cell)

@@ -34,10 +34,6 @@ class Slider(gymnasium.Env):
         return np.array([self.hidden["place"]]), float(done), done, False, {}
 
 
-class Discrete(Slider):
-    action_space = spaces.Discrete(3)
-
-
 class Named(Slider):
     action_space = spaces.Dict(force=BOX)
 
@@ -60,7 +56,7 @@ def normalised(**_: Any) -> gymnasium.Env:
     return wrappers.NormalizeObservation(Slider())
 
 
-ENTRIES = {"Discrete": Discrete, "Named": Named, "Noisy": Noisy, "Forgetful": Forgetful, "Stacked": stacked,
+ENTRIES = {"Named": Named, "Noisy": Noisy, "Forgetful": Forgetful, "Stacked": stacked,
            "Normalised": normalised}
 
 
@@ -85,8 +81,7 @@ def complaint(words: str, status: int, capsys: pytest.CaptureFixture[str]) -> st
 
 @pytest.mark.parametrize("verb", ["plan", "doctor"])
 @pytest.mark.parametrize(("name", "message"), [
-    ("Discrete", "expected a Box, since controls are continuous; map a Box to these actions"),
-    ("Named", "expected a Box, since controls are continuous; map a Box to these actions"),
+    ("Named", "expected a Box, Discrete, MultiDiscrete or MultiBinary; map one to these actions inside"),
     ("Noisy", "its steps are random; make the randomness part of its state"),
     ("Stacked", "FrameStackObservation has a memory or noise that a restored state would not bring back; leave it out"),
     ("Normalised", "NormalizeObservation has a memory or noise"),

@@ -145,7 +145,7 @@ MISTAKES = [
     ("plan --env pbcs/Maze-v0 --env-kwargs '{\"size\": 10000}'", 2, "size"),
     ("plan --env pbcs/Maze-v0 --env-kwargs '{\"start\": [0.0, 0.5]}'", 2, "wall"),
     ("plan --env pbcs/Maze-v0 --env-kwargs '{\"goal\": [1.0, 9.0]}'", 2, "goal"),
-    ("plan --env CartPole-v1", 2, "Box"),
+    ("plan --env Blackjack-v1", 2, "Box"),
     ("plan --env Pendulum-v1 --goal rewrd>0", 2, "did you mean 'reward'?"),
     ("plan --env Pendulum-v1 --feature obs[0:9]", 2, "obs has 3 numbers"),
     (f"plan {MAZE} --planner KPIECE", 2, "did you mean 'KPIECE1'?"),

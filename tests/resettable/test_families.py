@@ -75,10 +75,10 @@ def test_steps_are_those_of_the_environment_itself() -> None:
 
 def test_bounds_are_those_of_the_observation_space_where_it_is_the_feature() -> None:
     model: Any = make("MountainCarContinuous-v0")
-    assert model.env.bounds_from == "the observation space"
+    assert model.env.bounds.source == "the observation space"
     np.testing.assert_allclose(model.feature_high, [0.6, 0.07])
     pendulum: Any = make("Pendulum-v1")
-    assert "random steps" in pendulum.env.bounds_from
+    assert "random steps" in pendulum.env.bounds.source
     assert (pendulum.feature_low < pendulum.initial_state()[:2]).all()
 
 

@@ -3,7 +3,7 @@
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium import spaces, wrappers
+from gymnasium import spaces
 
 from pbcs_ompl.core.errors import (
     InvalidOption,
@@ -105,48 +105,19 @@ BOX = spaces.Box(-1.0, 1.0, (2,))
     (spaces.Dict(push=BOX), BOX, "expected a Box"),
     (spaces.Box(-np.inf, np.inf, (2,)), BOX, "finite bounds"),
     (spaces.Box(-1.0, 1.0, (2, 2)), BOX, "expected a vector"),
-    (BOX, spaces.Tuple([BOX]), "Dict of Boxes"),
-    (BOX, spaces.Dict(kind=spaces.Discrete(3)), "Dict of Boxes"),
-    (BOX, spaces.Discrete(3), "Dict of Boxes"),
+    (BOX, spaces.Text(3), "leave out Text"),
+    (BOX, spaces.Dict(position=BOX, graph=spaces.Sequence(BOX)), "leave out Sequence"),
+    (BOX, spaces.Box(0, 255, (8, 8, 3), np.uint8), "pictures"),
+    (BOX, spaces.Dict(camera=spaces.Box(0, 255, (8, 8), np.uint8)), "pictures"),
 ])
 def test_unsupported_spaces(action: gymnasium.Space, observation: gymnasium.Space, complaint: str) -> None:
     with pytest.raises(UnsupportedSpace, match=complaint):
         adapt(Spaces(action, observation))
 
 
-@pytest.mark.parametrize(("observation", "complaint"), [
-    (spaces.Dict(position=BOX), "Dict: expected a vector Box; flatten"),
-    (spaces.Tuple([BOX]), "Tuple"),
-    (spaces.Box(0.0, 1.0, (3, 3)), "vector Box"),
-    (spaces.Discrete(3), "vector Box"),
-])
-def test_observations_that_go_with_a_state_of_its_own(observation: gymnasium.Space, complaint: str) -> None:
-    with pytest.raises(UnsupportedSpace, match=complaint):
-        adapt(SpacesAndState(BOX, observation))
-
-
-def test_wrappers_of_limits_and_rewards_are_removed() -> None:
-    env = wrappers.RecordEpisodeStatistics(gymnasium.make("pbcs/Maze-v0"))
-    assert adapt(wrappers.TransformReward(env, lambda reward: 2 * reward)).spec.id == "pbcs/Maze-v0"
-
-
-@pytest.mark.parametrize("wrap", [
-    lambda env: wrappers.FrameStackObservation(env, 2),
-    lambda env: wrappers.NormalizeObservation(env),
-    lambda env: wrappers.StickyAction(env, 0.5),
-    lambda env: wrappers.TimeAwareObservation(wrappers.TimeLimit(env, 100)),
-    lambda env: wrappers.DelayObservation(env, 2),
-])
-def test_wrappers_with_a_memory_are_refused(wrap: object) -> None:
-    with pytest.raises(NotResettable, match=r"memory or noise.*leave it out"):
-        adapt(wrap(gymnasium.make("pbcs/Maze-v0")))  # type: ignore[operator]
-
-
-def test_other_wrappers_are_refused_with_a_remedy() -> None:
-    env = wrappers.RescaleAction(gymnasium.make("pbcs/Maze-v0"), -1.0, 1.0)
-    with pytest.raises(NotResettable, match=r"RescaleAction.*pass env\.unwrapped"):
-        adapt(env)
-    assert adapt(env.unwrapped).spec.id == "pbcs/Maze-v0"
+def test_observations_of_an_environment_with_a_state_of_its_own() -> None:
+    with pytest.raises(UnsupportedSpace, match="leave out Text"):
+        adapt(SpacesAndState(BOX, spaces.Dict(name=spaces.Text(3))))
 
 
 def test_the_protocol_is_what_the_mazes_offer() -> None:

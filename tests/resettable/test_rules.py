@@ -32,17 +32,30 @@ def height(seen: Outcome) -> np.ndarray:
     ("obs[1:]", [1.0, 2.0]),
     ("qpos[0:2]", [0.0, 1.0]), ("qvel[3]", [-3.0]), ("state", [7.0, 8.0]), (" qpos[4] , obs[ 0 ] ", [4.0, 0.0]),
     ("reward", [0.5]),
+    ("obs[-1]", [2.0]), ("obs[-2:]", [1.0, 2.0]), ("obs[:-1]", [0.0, 1.0]), ("qvel[-1],obs[0]", [-3.0, 0.0]),
+    ("|qvel[2:4]|", [2.0, 3.0]), ("obs[:]", [0.0, 1.0, 2.0]),
+    ("info[goal][at]", [3.0, -4.0]), ("info[goal][at][-1]", [-4.0]), ("|info[goal][at][0:2]|", [3.0, 4.0]),
+    ("info['goal'][\"at\"][0]", [3.0]), ("info[speed]", [0.25]),
 ])
 def test_features(rule: str, expected: list[float]) -> None:
-    assert feature_rule(rule)(outcome()).tolist() == expected
+    seen = outcome(goal={"at": np.array([3.0, -4.0])}, speed=np.float32(0.25))
+    assert feature_rule(rule)(seen).tolist() == expected
 
 
 @pytest.mark.parametrize(("rule", "expected"), [
     ("reward>0", True), ("reward > 0.5", False), ("reward>=0.5", True), ("qpos[3]<3", False), ("qpos[3]<=3", True),
+    ("|qvel[1]|<=1 and reward>0", True), ("|qvel[1]|<1 and reward>0", False),
+    ("obs[-1]>1 and obs[0]<1 and reward<1", True),
+    ("info[far]<0.1", False), ("info[near]<0.1 and info[flag]>0", True), ("info[flag]<1", False),
     ("qpos[0:3]<3", True), ("qpos[0:4]<3", False), ("obs[2]>=2.", True), ("terminated>0", False),
 ])
 def test_goals(rule: str, expected: bool) -> None:
-    assert goal_rule(rule)(outcome()) is expected
+    assert goal_rule(rule)(outcome(far=1.0, near=np.array([0.01]), flag=True)) is expected
+
+
+def test_what_a_reset_does_not_report_is_no_success() -> None:
+    assert goal_rule("info[distance]<0.1")(outcome(reward=np.nan)) is False
+    assert goal_rule("info[distance]<0.1")(outcome(reward=np.nan, distance=0.05)) is True
 
 
 @given(st.lists(st.floats(-1e9, 1e9), min_size=1, max_size=8), st.data())
@@ -59,7 +72,8 @@ def test_dictionaries_are_read_in_the_order_of_their_names() -> None:
 
 
 @pytest.mark.parametrize(("rule", "complaint"), [
-    ("qpso[0:2]", "did you mean 'qpos'"), ("qpos[0:", "does not parse"), ("", "does not parse"), ("qpos[-1]", "parse"),
+    ("qpso[0:2]", "did you mean 'qpos'"), ("qpos[0:", "does not parse"), ("", "does not parse"), ("qpos[-6]", "0 to 4"),
+    ("|obs[0]", "parse"), ("obs[0][1]", "parse"), ("info", "parse"),
     ("qpos[0:9]", "qpos has 5 numbers, 0 to 4"), ("qpos[5]", "0 to 4"), ("qpos[3:2]", "0 to 4"),
     ("achieved_goal", "no 'achieved_goal'"), ("nowhere_to_be_found:f", "no such function"), ("math:nothing", "no such"),
 ])
@@ -69,11 +83,15 @@ def test_bad_features(rule: str, complaint: str) -> None:
 
 
 @pytest.mark.parametrize(("rule", "complaint"), [
+    ("reward>nan", "no finite number"), ("reward>1e999", "no finite number"), ("reward<-inf", "no finite number"),
+    ("obs[0]==1", "there is no ==.*say how near"), ("obs[0]!=1 and reward>0", "there is no !="),
+    ("reward>0 and", "expected a number"), ("reward>0 and obs[0]", "compares nothing"), ("info[speed]>1", "no 'speed'"),
+    ("info[name]>1", "expected numbers"), ("info[dist]<1", "did you mean 'distance'"),
     ("reward>much", "expected a number"), ("reward", "compares nothing"), ("rewrd>0", "did you mean 'reward'"),
 ])
 def test_bad_goals(rule: str, complaint: str) -> None:
     with pytest.raises(InvalidOption, match=complaint):
-        goal_rule(rule)(outcome())
+        goal_rule(rule)(outcome(distance=0.5, name="ball"))
 
 
 def test_mujoco_words_need_mujoco() -> None:

@@ -5,6 +5,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from pbcs_ompl.resettable import adapt
+
 BOX = gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float64)
 PUSH = gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float64)
 XML = """<mujoco><option timestep="0.01"/><worldbody><body name="b"><joint name="x" type="slide" axis="1 0 0"
@@ -79,3 +81,11 @@ class Cart(gymnasium.Env):
     def reward(self) -> float:
         """Return the reward after a step."""
         return 0.0
+
+
+def push_on(env: gymnasium.Env, steps: int, control: float) -> None:
+    """Adapt an environment and push it one way, each step from the state that the last one led to."""
+    model = adapt(env)
+    state = model.initial_state(0)
+    for _ in range(steps):
+        state = model.transition(state[None], np.full((1, 1), control)).states[0]

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from pbcs_ompl.core.errors import RunFolderError
-from pbcs_ompl.results.folder import lock
+from pbcs_ompl.results.folder import LOCK, RunFolder, lock
 
 HOLDER = """
 import sys, time
@@ -68,3 +68,11 @@ def test_a_folder_that_does_not_exist_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError), lock(tmp_path / "file" / ".lock"):
         pass
+
+
+def test_a_link_in_place_of_the_lock_is_not_followed(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / LOCK).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(RunFolderError, match="is a link"):
+        RunFolder(tmp_path / "run")
+    assert not (tmp_path / "elsewhere").exists()

@@ -10,9 +10,11 @@ from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch, UnknownName
 from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.skills.activation_sets import Ball, EnvironmentGoal
 from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.evaluation import evaluate
+from pbcs_ompl.skills.observed_sets import Entry, ObservedBall
 from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
 
 MODEL = make("pbcs/Maze-v0", {"size": 2})
@@ -29,9 +31,10 @@ def towards(point):
 def round_the_corner():
     """The hand-made chain of the 2x2 maze: right, up, left."""
     targets = [Ball(np.array(ENDS[0]), 0.15), Ball(np.array(ENDS[1]), 0.15), EnvironmentGoal(MODEL.goal_threshold)]
-    skills = tuple(Skill(towards(end), Ball(np.array(start), 0.15), target)
-                   for start, end, target in zip(TURNS, ENDS, targets, strict=True))
-    return SkillChain(skills, np.array(TURNS[0]), MODEL.spec, 200)
+    entries = [Entry(), *(Entry((ObservedBall(np.array(turn), np.ones(2), 0.15),)) for turn in TURNS[1:])]
+    skills = tuple(Skill(towards(end), Ball(np.array(start), 0.15), target, entry)
+                   for start, end, target, entry in zip(TURNS, ENDS, targets, entries, strict=True))
+    return SkillChain(skills, np.array(TURNS[0]), MODEL.spec, 200, ActionMap.of(MODEL.env.action_space), 0)
 
 
 def test_the_chain_walks_round_the_corners():
@@ -52,10 +55,23 @@ def test_a_batch_of_executions_equals_single_ones():
 
 
 def test_the_controller_never_goes_back_and_may_skip():
-    controller = round_the_corner().controller(MODEL)
+    controller = round_the_corner().controller()
+    controller.reset()
     for state, expected in ((TURNS[0], 0), (TURNS[2], 2), (TURNS[1], 2), (TURNS[0], 2)):
-        controller.act(np.array([state]))
+        assert controller.act(np.array(state)) in MODEL.env.action_space
         assert controller.current.tolist() == [expected]
+    controller.reset()
+    assert controller.current.tolist() == [0]
+
+
+def test_the_controller_and_the_judge_need_no_model():
+    env = gymnasium.make("pbcs/Maze-v0", size=2)
+    controller, (observation, info), steps = round_the_corner().controller(), env.reset(seed=5), 0
+    while not info["is_success"] and steps < 100:
+        observation, _, _, _, info = env.step(controller.act(observation))
+        steps += 1
+    assert evaluate(round_the_corner(), episodes=1).steps_median == steps
+    assert MODEL.goal_distance(observation[None])[0] < MODEL.goal_threshold
 
 
 def test_the_time_limit_ends_an_execution():

@@ -5,7 +5,9 @@ import pytest
 
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption
+from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.skills import SkillChain, resume, train
 from pbcs_ompl.skills.activation_sets import (
     Ball,
@@ -19,6 +21,7 @@ from pbcs_ompl.skills.activation_sets import (
 )
 from pbcs_ompl.skills.chain import Skill
 from pbcs_ompl.skills.episodes import run_episodes
+from pbcs_ompl.skills.observed_sets import Entry, ObservedBall, ObservedClassifier
 from pbcs_ompl.skills.pbcs import PBCSSettings
 from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
 
@@ -38,7 +41,7 @@ def tried(count, seed):
     rng = np.random.default_rng(seed)
     states = MODEL.perturb(CENTER, SETTINGS.reach * RADIUS, count, rng)
     return states, run_episodes(MODEL, straight_up, TARGET, states, epsilon=0.0, max_steps=30, rng=rng,
-                                success_reward=None).reached
+                                success_reward=None, counter=Counter()).reached
 
 
 def learnt():
@@ -90,12 +93,18 @@ def test_arrays_and_back(part):
 def test_a_chain_with_a_learnt_set_survives_a_file(tmp_path):
     actor = Policy(((np.eye(2, dtype=np.float32), np.zeros(2, np.float32)),), MODEL.action_low, MODEL.action_high)
     policy = SkillPolicy(actor, ObservationTransform.identity(2))
-    skills = (Skill(policy, TARGET, learnt()), Skill(policy, learnt(), EnvironmentGoal(0.2)))
-    SkillChain(skills, CENTER, MODEL.spec, 50).save(tmp_path)
+    part = learnt()
+    entry = Entry((ObservedBall(CENTER, np.ones(2), part.reach * part.radius), ObservedClassifier.of(part)))
+    skills = (Skill(policy, TARGET, part, Entry()), Skill(policy, part, EnvironmentGoal(0.2), entry))
+    SkillChain(skills, CENTER, MODEL.spec, 50, ActionMap.of(MODEL.env.action_space)).save(tmp_path)
     loaded = SkillChain.load(tmp_path)
     assert [kind_of(skill.activation) for skill in loaded.skills] == ["ball", "classifier"]
     assert [kind_of(skill.target) for skill in loaded.skills] == ["classifier", "goal"]
     states, _ = tried(100, 4)
+    inside = part.contains(MODEL, states)
+    assert 0 < inside.sum() < len(states)
+    np.testing.assert_array_equal(loaded.skills[1].entry.contains(MODEL.observe(states)), inside)
+    assert loaded.skills[0].entry.contains(MODEL.observe(states)).all()
     np.testing.assert_array_equal(loaded.skills[1].activation.contains(MODEL, states),
                                   learnt().contains(MODEL, states))
 

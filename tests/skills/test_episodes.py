@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pbcs_ompl.core.errors import BudgetUsedUp
+from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
 from pbcs_ompl.skills.activation_sets import Ball, EnvironmentGoal
 from pbcs_ompl.skills.episodes import run_episodes, shaped_rewards, with_random_actions
@@ -24,7 +26,8 @@ def starts(count, seed=0):
 
 def test_a_batch_equals_single_episodes():
     target, act = Ball(np.array([0.5, 0.5]), 0.1), towards([0.5, 0.5])
-    options = {"epsilon": 0.0, "max_steps": 30, "rng": np.random.default_rng(0), "success_reward": REWARD}
+    options = {"epsilon": 0.0, "max_steps": 30, "rng": np.random.default_rng(0), "success_reward": REWARD,
+               "counter": Counter()}
     together = run_episodes(MODEL, act, target, starts(20), **options)
     apart = [run_episodes(MODEL, act, target, one[None], **options)
              for one in starts(20)]
@@ -39,14 +42,16 @@ def test_a_batch_equals_single_episodes():
 
 def test_transitions_are_steps_of_the_environment():
     episodes = run_episodes(MODEL, towards([1.5, 0.5]), EnvironmentGoal(0.2), starts(10), epsilon=0.5, max_steps=15,
-                            rng=np.random.default_rng(1), success_reward=REWARD)
+                            rng=np.random.default_rng(1), success_reward=REWARD,
+                            counter=Counter())
     np.testing.assert_array_equal(MODEL.transition(episodes.states, episodes.controls).states, episodes.next_states)
 
 
 def test_only_the_last_transition_of_a_successful_episode_is_terminal():
     target = Ball(np.array([0.5, 0.5]), 0.1)
     episodes = run_episodes(MODEL, towards([0.5, 0.5]), target, np.array([[0.2, 0.2], [1.5, 1.5]]), epsilon=0.0,
-                            max_steps=10, rng=np.random.default_rng(0), success_reward=REWARD)
+                            max_steps=10, rng=np.random.default_rng(0), success_reward=REWARD,
+                            counter=Counter())
     assert episodes.reached.tolist() == [True, False]
     assert episodes.terminals.sum() == 1
     assert episodes.rewards[episodes.terminals].tolist() == [REWARD]
@@ -56,7 +61,8 @@ def test_only_the_last_transition_of_a_successful_episode_is_terminal():
 
 def test_unshaped_rewards_are_the_environments():
     episodes = run_episodes(MODEL, towards([0.5, 1.5]), EnvironmentGoal(0.2), np.array([[0.5, 1.2]]), epsilon=0.0,
-                            max_steps=10, rng=np.random.default_rng(0), success_reward=None)
+                            max_steps=10, rng=np.random.default_rng(0), success_reward=None,
+                            counter=Counter())
     assert episodes.rewards.tolist() == [1.0]
 
 
@@ -88,3 +94,11 @@ def test_a_path_earns_the_difference_of_potentials_of_its_ends(along):
 def test_no_step_outside_the_goal_is_worth_as_much_as_reaching_it(along):
     before, after = np.array(along[:-1]), np.array(along[1:])
     assert (shaped_rewards(before, after, np.zeros(len(before), bool), 0.1, REWARD) < REWARD).all()
+
+
+def test_a_budget_binds_to_the_transition():
+    counter = Counter(33)
+    with pytest.raises(BudgetUsedUp):
+        run_episodes(MODEL, towards([1.5, 0.5]), EnvironmentGoal(0.2), starts(10), epsilon=0.5, max_steps=15,
+                     rng=np.random.default_rng(1), success_reward=REWARD, counter=counter)
+    assert 0 <= counter.left < 10

@@ -25,7 +25,7 @@ def build(method, name, **changes):
         return DDPG(MODEL.observation_size, MODEL.action_low, MODEL.action_high, seeds=(seed,),
                     settings=DDPGSettings.from_preset("fast"))
 
-    waypoints = Waypoints.at_start(MODEL.initial_state(0), MODEL, settings.starts)
+    waypoints = Waypoints.at_start(0, MODEL, settings.starts)
     trainer = SkillTrainer(agent, waypoints, settings.episodes, Counter(100_000), np.random.default_rng(0))
     return method(trainer, settings)
 

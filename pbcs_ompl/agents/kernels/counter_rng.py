@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.seeding import SeedTree
 
 Keys = NDArray[np.uint64]
@@ -31,7 +31,7 @@ def normal(keys: Keys, first: int, count: int, shape: tuple[int, ...]) -> Number
     return out.reshape(count, len(keys), *shape)
 
 
-@njit(cache=True)
+@njit()
 def hashed(key: np.uint64, position: int) -> float:
     """Return a number in [0, 1) with 53 random bits: splitmix64 of key and position."""
     z = key * np.uint64(0xD1342543DE82EF95) + np.uint64(position) * np.uint64(0x9E3779B97F4A7C15)
@@ -41,7 +41,7 @@ def hashed(key: np.uint64, position: int) -> float:
     return np.float64(z >> np.uint64(11)) * 2.0**-53
 
 
-@njit(cache=True)
+@njit()
 def _uniform(keys: Keys, first: int, out: Numbers) -> None:
     count, seeds, width = out.shape
     for k in range(count):
@@ -51,7 +51,7 @@ def _uniform(keys: Keys, first: int, out: Numbers) -> None:
                 out[k, s, i] = min(np.float32(hashed(keys[s], (first + k) * width + i)), np.float32(1.0 - 2.0**-24))
 
 
-@njit(cache=True)
+@njit()
 def _normal(keys: Keys, first: int, out: Numbers) -> None:
     count, seeds, width = out.shape
     for k in range(count):

@@ -3,9 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from pbcs_ompl.agents.kernels import network as nets
+from pbcs_ompl.core.compiled import njit
 
 
 class Stack(NamedTuple):
@@ -54,7 +55,7 @@ def _update(rows: np.ndarray, rates: np.ndarray, actor: Stack, critic: Stack, co
         _update_seed(rows[:, seed], rates, seed, actor, critic, constants, losses[:, seed])
 
 
-@njit(cache=True)
+@njit()
 def _update_seed(rows: np.ndarray, rates: np.ndarray, seed: int, actor: Stack, critic: Stack,
                  constants: Constants, losses: np.ndarray) -> None:
     scratch = _scratch(actor, critic, rows.shape[1])
@@ -69,7 +70,7 @@ def _update_seed(rows: np.ndarray, rates: np.ndarray, seed: int, actor: Stack, c
         nets.polyak_update(critic.sizes, critic.weights, critic.target, critic.seeds, seed, constants.tau)
 
 
-@njit(cache=True)
+@njit()
 def _scratch(actor: Stack, critic: Stack, batch: int) -> Scratch:
     long, short = nets.num_activations(critic.sizes, batch), nets.num_activations(actor.sizes, batch)
     return Scratch(np.empty(short, np.float32), np.empty(short, np.float32),
@@ -78,7 +79,7 @@ def _scratch(actor: Stack, critic: Stack, batch: int) -> Scratch:
                    np.empty(len(critic.weights) // critic.seeds, np.float32), np.empty(batch, np.float32))
 
 
-@njit(cache=True)
+@njit()
 def _act(actor: Stack, flat: np.ndarray, seed: int, observations: np.ndarray, constants: Constants,
          activations: np.ndarray, obs_actions: np.ndarray) -> None:
     """Run the actor `flat` on observations [B, O].
@@ -100,7 +101,7 @@ def _act(actor: Stack, flat: np.ndarray, seed: int, observations: np.ndarray, co
             obs_actions[item * (width + actions) + width + a] = constants.centre[a] + constants.half[a] * squashed
 
 
-@njit(cache=True)
+@njit()
 def _critic_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, constants: Constants,
                      scratch: Scratch) -> float:
     batch, pair = rows.shape[0], critic.sizes[0]
@@ -124,7 +125,7 @@ def _critic_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, c
     return mean
 
 
-@njit(cache=True)
+@njit()
 def _actor_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, constants: Constants,
                     scratch: Scratch) -> float:
     batch, size, pair = rows.shape[0], actor.sizes[0], critic.sizes[0]
@@ -149,5 +150,5 @@ def _actor_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, co
     return mean
 
 
-update_one = njit(cache=True)(_update)
-update_many = njit(cache=True, parallel=True)(_update)
+update_one = njit()(_update)
+update_many = njit(parallel=True)(_update)

@@ -10,9 +10,11 @@ from typing import Any
 import llvmlite.binding
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+from pbcs_ompl.core.compiled import njit
 
 WIDE = bool(llvmlite.binding.get_host_cpu_features().get("avx512f", False))
 LANES = 16 if WIDE else 8
@@ -117,7 +119,7 @@ def _transpose_block(typing: Any, a: Any, a0: Any, a_row: Any, b: Any, b0: Any, 
     return signature, emit
 
 
-@njit(cache=True)
+@njit()
 def transpose(a: np.ndarray, a0: int, b: np.ndarray, b0: int, rows: int, columns: int) -> None:
     """B [columns, rows] = A^T for A [rows, columns], both contiguous. The last blocks overlap others."""
     if rows < EDGE or columns < EDGE:
@@ -132,7 +134,7 @@ def transpose(a: np.ndarray, a0: int, b: np.ndarray, b0: int, rows: int, columns
             _transpose_block(a, a0 + i * columns + j, columns, b, b0 + j * rows + i, rows)
 
 
-@njit(cache=True)
+@njit()
 def product(a: np.ndarray, a0: int, a_row: int, a_column: int, b: np.ndarray, b0: int, c: np.ndarray, c0: int,
             shape: tuple[int, int, int]) -> None:
     """C [m, n] = A B for shape (m, n, k); A has any strides, B [k, n] and C are contiguous.
@@ -154,7 +156,7 @@ def product(a: np.ndarray, a0: int, a_row: int, a_column: int, b: np.ndarray, b0
             c[c0 + i * n + j] = wide[i * LANES + j]
 
 
-@njit(cache=True)
+@njit()
 def _wide_product(a: np.ndarray, a0: int, a_row: int, a_column: int, b: np.ndarray, b0: int, c: np.ndarray,
                   c0: int, m: int, n: int, k: int) -> None:
     if m < ROWS:

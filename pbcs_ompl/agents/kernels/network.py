@@ -7,9 +7,9 @@ each block; a gradient is a buffer of one seed.
 """
 
 import numpy as np
-from numba import njit
 
 from pbcs_ompl.agents.kernels.matrix import product, transpose
+from pbcs_ompl.core.compiled import njit
 
 Sizes = tuple[int, ...]
 BETA_1, BETA_2 = 0.9, 0.999
@@ -18,19 +18,19 @@ FAST = {"contract", "reassoc", "nsz", "arcp"}
 """Sums in any order and fused, but NaN and infinity stay what they are: they must be noticed."""
 
 
-@njit(cache=True)
+@njit()
 def num_activations(sizes: Sizes, batch: int) -> int:
     """Length of the activations of a pass."""
     return batch * sum(sizes)
 
 
-@njit(cache=True)
+@njit()
 def outputs_offset(sizes: Sizes, batch: int) -> int:
     """Where the outputs begin among the activations."""
     return batch * (sum(sizes) - sizes[-1])
 
 
-@njit(cache=True)
+@njit()
 def parameter_offsets(sizes: Sizes, layer: int, seeds: int, seed: int) -> tuple[int, int]:
     """Where the weight and the bias of one layer and seed begin in the buffer of a stack."""
     start = 0
@@ -40,7 +40,7 @@ def parameter_offsets(sizes: Sizes, layer: int, seeds: int, seed: int) -> tuple[
     return seeds * start + seed * block, seeds * (start + block) + seed * sizes[layer + 1]
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def forward(sizes: Sizes, flat: np.ndarray, seeds: int, seed: int, activations: np.ndarray, batch: int) -> None:
     """Compute the activations behind the inputs."""
     start, layers = 0, len(sizes) - 1
@@ -54,7 +54,7 @@ def forward(sizes: Sizes, flat: np.ndarray, seeds: int, seed: int, activations: 
         start = out
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def _add_bias(values: np.ndarray, bias: np.ndarray, hidden: bool) -> None:
     """Add the bias [out] to values [B, out], and set negative ones of a hidden layer to 0 (NaN stays)."""
     if hidden:
@@ -68,7 +68,7 @@ def _add_bias(values: np.ndarray, bias: np.ndarray, hidden: bool) -> None:
                 values[item, j] += bias[j]
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def _add_rows(rows: np.ndarray, total: np.ndarray) -> None:
     total[:] = 0.0
     for item in range(rows.shape[0]):
@@ -76,14 +76,14 @@ def _add_rows(rows: np.ndarray, total: np.ndarray) -> None:
             total[j] += rows[item, j]
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def _relu_backward(grads: np.ndarray, values: np.ndarray) -> None:
     """Let gradients pass where a hidden layer's values are positive."""
     for i in range(len(values)):
         grads[i] = grads[i] if values[i] > 0.0 else np.float32(0.0)
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def backward(sizes: Sizes, flat: np.ndarray, seeds: int, seed: int, activations: np.ndarray, grads: np.ndarray,
              batch: int, gradient: np.ndarray, to_inputs: bool) -> None:
     """Propagate the outputs' gradients back, to the inputs if `to_inputs`; fill `gradient` [P] unless it is empty."""
@@ -103,7 +103,7 @@ def backward(sizes: Sizes, flat: np.ndarray, seeds: int, seed: int, activations:
             _relu_backward(grads[below:out], activations[below:out])
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def adam_step(sizes: Sizes, weights: np.ndarray, mean: np.ndarray, square: np.ndarray, seeds: int, seed: int,
             gradient: np.ndarray, rate: np.ndarray) -> None:
     """Make one step of Adam for one seed against its gradient [P]; `rate` is one row of `adam_rates`."""
@@ -118,7 +118,7 @@ def adam_step(sizes: Sizes, weights: np.ndarray, mean: np.ndarray, square: np.nd
 
 
 # Python's error model would check every division, and so prevent vectorisation of the loop.
-@njit(cache=True, fastmath=FAST, error_model="numpy")
+@njit(fastmath=FAST, error_model="numpy")
 def _adam(weights: np.ndarray, mean: np.ndarray, square: np.ndarray, gradient: np.ndarray, step: float,
           epsilon: float) -> None:
     tiny = np.float32(1e-30)
@@ -133,7 +133,7 @@ def _adam(weights: np.ndarray, mean: np.ndarray, square: np.ndarray, gradient: n
         weights[i] -= step * m / (np.sqrt(v) + epsilon)
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def polyak_update(sizes: Sizes, weights: np.ndarray, target: np.ndarray, seeds: int, seed: int,
            tau: np.float32) -> None:
     """Move one seed's target: target <- target + tau (weights - target)."""
@@ -146,7 +146,7 @@ def polyak_update(sizes: Sizes, weights: np.ndarray, target: np.ndarray, seeds: 
                 slow[i] += tau * (fast[i] - slow[i])
 
 
-@njit(cache=True)
+@njit()
 def outputs(sizes: Sizes, flat: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     """Return the outputs [B, out] of one network for inputs [B, in]."""
     batch = inputs.shape[0]

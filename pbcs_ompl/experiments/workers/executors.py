@@ -8,6 +8,7 @@ from typing import Protocol
 
 from pbcs_ompl.core.options import check_range
 from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
+from pbcs_ompl.experiments.workers.start import check_script
 from pbcs_ompl.experiments.workers.worker import Limits, Worker
 
 
@@ -36,10 +37,12 @@ def make_executor(jobs: int | Executor) -> Executor:
 
     Raises:
         InvalidOption: fewer than one process.
+        CannotStart: they could not import the running script.
     """
     if not isinstance(jobs, int):
         return jobs
     check_range("jobs", jobs, jobs >= 1, "at least 1")
+    check_script()
     return partial(run_in_processes, jobs)
 
 

@@ -2,21 +2,23 @@
 
 import json
 import math
-import os
 import signal
-import threading
 import time
 from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
+from typing import Any
 
 import psutil
 
+from pbcs_ompl.core.callbacks import describe
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.options import check_range
 from pbcs_ompl.core.plain import plain
+from pbcs_ompl.core.signals import STOPPING
 from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
+from pbcs_ompl.experiments.workers.start import GUARD, CannotStart, end_with_parent
 
 SECONDS_BETWEEN_POLLS = 0.1
 """How often the memory of a worker is measured; the system does not report when it grows."""
@@ -24,7 +26,7 @@ IDLE_MEMORY_FRACTION = 0.5
 """A worker that holds more than this share of its limit between two runs is replaced: each run has the rest of it."""
 SHUTDOWN_TIMEOUT = 5.0
 """Seconds within which an idle process has to end by itself."""
-READY = None
+READY = "ready"
 """The first message of a worker: it has imported what its runs need."""
 SPAWN = get_context("spawn")
 
@@ -63,11 +65,13 @@ class Worker:
 
     def _spawn(self) -> None:
         self.connection, other_end = SPAWN.Pipe()
-        self._process = SPAWN.Process(target=worker_main, args=(self._function, other_end))
+        self._process = SPAWN.Process(target=worker_main, args=(other_end,))
         self._process.start()
         self._measured = psutil.Process(self._process.pid)
         other_end.close()
         self._is_ready, self._deadline = False, math.inf
+        with suppress(BrokenPipeError):  # `poll` finds that it died
+            self.connection.send(self._function)
 
     def start(self, run: Run) -> None:
         """Start a run; in a new process if the old one is gone or has kept too much memory."""
@@ -85,16 +89,25 @@ class Worker:
                 self._spawn()
 
     def poll(self) -> Record | Failure | None:
-        """Return what the run found, None while it continues. Never blocks."""
+        """Return what the run found, None while it continues. Never blocks.
+
+        Raises:
+            CannotStart: the process ended before it was ready for any run.
+        """
         try:
             if self.connection.poll():
-                message = self.connection.recv()
-                if message is not READY:
+                message: Any = self.connection.recv()
+                if self._is_ready:
                     return message  # type: ignore[no-any-return]
+                if message != READY:
+                    raise CannotStart(f"cannot start workers: {message}")
                 self._is_ready = True
                 self._send()
         except (EOFError, OSError):
             self.kill()
+            if not self._is_ready:
+                raise CannotStart(f"cannot start workers: {self._cause_of_death()}, before it was ready for a run "
+                                  f"(does the script have its calls below {GUARD}?)") from None
             return Failure(self._cause_of_death())
         reason = self._exceeded()
         if reason is not None:
@@ -154,14 +167,24 @@ class Worker:
     def _cause_of_death(self) -> str:
         code = self._process.exitcode or 0
         cause = signal.strsignal(-code) if code < 0 else f"exit status {code}"
-        guard = "" if self._is_ready else " (or a script without if __name__ == '__main__': around its calls)"
-        return f"the process died, {cause}: a crash in C++, or out of memory{guard}"
+        return f"the process died, {cause}: a crash in C++, or out of memory"
 
 
-def worker_main(function: RunFunction, connection: Connection) -> None:
-    """Make each run that comes through `connection` and send back what it found, until the connection is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+def worker_main(connection: Connection) -> None:
+    """Make each run that comes through `connection` and send back what it found, until the connection is closed.
+
+    First comes the function that makes them: what it imports takes seconds.
+    """
+    end_with_parent()
+    for number in STOPPING:
+        signal.signal(number, signal.SIG_IGN)  # they are for the parent, which ends its workers
+    try:
+        function = connection.recv()
+    except EOFError:
+        return
+    except (Exception, SystemExit) as error:
+        connection.send(describe(error))
+        return
     connection.send(READY)
     while True:
         try:
@@ -178,13 +201,5 @@ def _found(function: RunFunction, run: Run) -> Record | Failure:
     except PbcsError as error:
         return Failure(str(error))
     except Exception as error:  # a mistake of a plug-in's author must not end the other runs
-        return Failure(f"{type(error).__name__}: {error}")
+        return Failure(describe(error))
     return record
-
-
-def _end_with_parent() -> None:
-    """End this process when its parent is gone, for whatever reason."""
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

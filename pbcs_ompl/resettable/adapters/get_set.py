@@ -9,9 +9,10 @@ from pbcs_ompl.core.batches import check_batch
 from pbcs_ompl.core.errors import InvalidOption, InvalidState, NotResettable
 from pbcs_ompl.core.types import Array, BoolArray, Transition
 from pbcs_ompl.resettable.actions import Actions
-from pbcs_ompl.resettable.adapters.success_flag import as_vector, missing_observe, observes_state, state_bounds
+from pbcs_ompl.resettable.adapters.success_flag import as_vector, state_bounds
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.model import Model
+from pbcs_ompl.resettable.observing import missing_observe, state_observer
 
 Step = tuple[Array, float, bool, bool]
 """Next state [D], reward, terminated, truncated."""
@@ -28,13 +29,14 @@ class GetSetStateModel(Model):
 
     def __init__(self, env: Any):
         offers = EnvAttributes.of(env)
-        observation, _ = env.reset(seed=0)
+        env.reset(seed=0)
         state = as_vector(env, env.get_env_state())
-        observes = observes_state(observation, state)
-        super().__init__(env, offers, *state_bounds(env, offers, state, observes))
+        super().__init__(env, offers, *state_bounds(env, offers, state))
         self.capabilities = offers.restores
-        if offers.observe is None and not observes:
-            raise NotResettable(missing_observe(env))
+        observe = state_observer(env, offers)
+        if observe is None:
+            raise missing_observe(env)
+        self._observe = observe
         if offers.goal_distance is None or offers.goal_threshold is None:
             raise NotResettable(f"{self.spec.id}: `goal_distance` and `goal_threshold` go together; set both")
         self._goal_distance: Callable[[Array], Array] = offers.goal_distance
@@ -68,8 +70,7 @@ class GetSetStateModel(Model):
 
     def observe(self, states: Array) -> Array:
         """Return the observations [B, O] of states [B, D]."""
-        states = np.array(states, dtype=np.float64)
-        return states if self._offers.observe is None else self._offers.observe(states)
+        return self._observe(np.array(states, dtype=np.float64))
 
     def goal_distance(self, states: Array) -> Array:
         """Return the distances [B] of states [B, D] to the goal."""

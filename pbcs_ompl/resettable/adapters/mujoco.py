@@ -17,6 +17,8 @@ from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes, plain_copies
 from pbcs_ompl.resettable.memory.memory import GUARD_EVERY, Memory
 from pbcs_ompl.resettable.rules import FeatureRule, Outcome, feature_rule
+from pbcs_ompl.resettable.supported import task_env
+from pbcs_ompl.resettable.task_env import bare
 
 BROKEN = "4.0.0"
 """The version that computes wrong accelerations where the constraint Jacobian is sparse."""
@@ -59,9 +61,13 @@ class MujocoEnv(RestorableEnv):
 
     def default_feature(self) -> FeatureRule:
         """Return the achieved goal where there is one, else the first two positions."""
-        if isinstance(self.inner.observation_space, gymnasium.spaces.Dict):
+        if isinstance(bare(self.inner).observation_space, gymnasium.spaces.Dict):
             return feature_rule("achieved_goal")
         return feature_rule("qpos[0:2]" if self.inner.model.nq > 1 else "qpos[0]")
+
+    def attach(self) -> None:
+        """Let the memory refer to `inner`."""
+        self._memory = self._memory.of(self.inner)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         """Reset the environment as if nothing had run in it before."""
@@ -153,7 +159,7 @@ class MujocoModel(GetSetStateModel):
         self._pool: ThreadPoolExecutor | None = None
 
     def _steps(self, states: Array, controls: Array) -> list[Step]:
-        if min(len(states), self._threads) < 2 or self.env.spec is None:
+        if min(len(states), self._threads) < 2 or self.make_env is None:
             return super()._steps(states, controls)
         if self._pool is None:
             self._open_pool()
@@ -165,9 +171,9 @@ class MujocoModel(GetSetStateModel):
         return done + [step for job in jobs for step in job.result()]
 
     def _open_pool(self) -> None:
+        assert self.make_env is not None
         for _ in range(self._threads - 1):
-            inner = gymnasium.make(self.env.spec).unwrapped
-            self._others.append(MujocoEnv(inner, self.env.goal_rule, self.env.feature_rule))
+            self._others.append(self.env.again(task_env(self.make_env(), self.spec.reset_options)))
         self._pool = ThreadPoolExecutor(self._threads - 1, thread_name_prefix="mujoco")
 
 

@@ -1,8 +1,10 @@
 """What every family's adapter makes of an environment: one with `get_env_state` and `set_env_state`."""
 
 import math
+import warnings
 from abc import ABC, abstractmethod
-from typing import Any
+from copy import copy
+from typing import Any, Self
 
 import gymnasium
 import numpy as np
@@ -10,7 +12,8 @@ from gymnasium.spaces import Box
 
 from pbcs_ompl.core.errors import CallbackFailed
 from pbcs_ompl.core.types import Array, Capability
-from pbcs_ompl.resettable.actions import ActionMap, copied
+from pbcs_ompl.resettable.actions import copied
+from pbcs_ompl.resettable.feature_bounds import feature_bounds, narrow_words
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rules import (
     FeatureRule,
@@ -21,10 +24,10 @@ from pbcs_ompl.resettable.rules import (
     reported_success,
     rule_text,
 )
+from pbcs_ompl.resettable.task_env import TaskEnv
 
 UNBOUNDED = 1e9
 """OMPL wants finite bounds. Dimensions that are not sampled get these."""
-EXPLORED_STEPS = 500
 
 
 class RestorableEnv(gymnasium.Env[Array, Array], ABC):
@@ -56,15 +59,30 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.action_space = inner.action_space
         self._head, self._distance = np.empty(0), 1.0
         self._has_goal_distance = False
+        self.named: Any = None
         observation, _ = self.reset(seed=0)
         self.observation_space = Box(-np.inf, np.inf, observation.shape, np.float64)
         self.goal_threshold = self.goal_radius if self._has_goal_distance else 0.5
         saved = len(self.save())
         self.feature_dims = tuple(range(len(self._head)))
-        low, high, self.bounds_from = feature_bounds(self, EXPLORED_STEPS)
+        self.bounds = feature_bounds(self)
+        if self.bounds.narrow:
+            warnings.warn(narrow_words(self.bounds), stacklevel=2)
         rest = np.full(saved + 1, UNBOUNDED)
-        self.state_low, self.state_high = np.concatenate([low, -rest]), np.concatenate([high, rest])
+        self.state_low = np.concatenate([self.bounds.low, -rest])
+        self.state_high = np.concatenate([self.bounds.high, rest])
         self.reset(seed=0)
+
+    def again(self, inner: Any) -> Self:
+        """Return the adapter of another instance of the environment, without exploring that one."""
+        other = copy(self)
+        other.inner = inner
+        other.attach()
+        other.reset(seed=0)
+        return other
+
+    def attach(self) -> None:
+        """Let what refers to the environment refer to `inner`."""
 
     @abstractmethod
     def save(self) -> Array:
@@ -80,7 +98,11 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
 
     @abstractmethod
     def observation(self) -> Any:
-        """Return the observation in the present state."""
+        """Return what the environment within the wrappers observes in the present state."""
+
+    def seen(self, observation: Any) -> Any:
+        """Return what the wrappers make of what `observation` returned."""
+        return self.inner.seen(observation) if isinstance(self.inner, TaskEnv) else observation
 
     def default_feature(self) -> FeatureRule:
         """Return what planners explore unless the user says otherwise."""
@@ -137,7 +159,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         rows = np.empty((len(states), *self.observation_space.shape))  # type: ignore[misc]
         for row, state in zip(rows, states, strict=True):
             self.set_env_state(state)
-            row[:] = flat(self.observation())
+            row[:] = flat(self.seen(self.observation()))
         return rows
 
     def goal_distance(self, states: Array) -> Array:
@@ -169,11 +191,13 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
 
     def _store(self, outcome: Outcome) -> bool:
         """Keep feature and distance of what was reached; return whether it is a success."""
-        self._head = np.asarray(self._feature_of(outcome), dtype=np.float64).reshape(-1)
+        self.named = self.inner.kept.last if isinstance(self.inner, TaskEnv) else outcome.observation
+        self._head = np.asarray(self._feature_of(outcome._replace(named=self.named)), dtype=np.float64).reshape(-1)
         if not len(self._head):
             raise CallbackFailed("the feature function returned no numbers")
         success = self.is_success(outcome)
-        reported = None if self.goal_rule is not None else self.reported_goal_distance(outcome)
+        seen = outcome._replace(observation=self.named)
+        reported = None if self.goal_rule is not None else self.reported_goal_distance(seen)
         self._has_goal_distance = reported is not None
         if reported is None:
             self._distance = 0.0 if success else 1.0
@@ -181,50 +205,3 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
             below = np.nextafter(self.goal_radius, 0.0)
             self._distance = min(reported, below) if success else max(reported, self.goal_radius)
         return success
-
-
-MARGIN = 1.0
-"""What random steps have not reached is expected within this many times their range."""
-
-
-def feature_bounds(env: Any, steps: int) -> tuple[Array, Array, str]:
-    """Return the bounds [F] of the feature of a `RestorableEnv`, and where they come from.
-
-    Where the feature is the whole observation, and its space has finite bounds, these are taken. Else random
-    steps, always the same, are made from `reset`, and the range they see is widened on both sides by itself.
-    """
-    given = env.feature_box()
-    if given is not None:
-        return *given, "the environment"
-    first, _ = env.reset(seed=0)
-    size = len(env.feature_dims)
-    declared = _declared(env.inner.observation_space)
-    rng = np.random.default_rng(0)
-    actions = ActionMap.of(env.action_space)
-    features, is_observation = [env.get_env_state()[:size]], _same(env.get_env_state()[:size], first)
-    for _ in range(steps):
-        action = actions.to_action(rng.uniform(actions.low, actions.high))
-        observation, _, terminated, truncated, _ = env.step(action)
-        features.append(env.get_env_state()[:size])
-        is_observation = is_observation and _same(features[-1], observation)
-        if terminated or truncated:
-            env.reset(seed=int(rng.integers(2**31)))
-    if is_observation and declared is not None:
-        return *declared, "the observation space"
-    seen = np.array(features)
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    widen = np.maximum(MARGIN * (high - low), 1e-3)
-    return low - widen, high + widen, f"{steps} random steps, widened"
-
-
-def _declared(space: Any) -> tuple[Array, Array] | None:
-    """Return the bounds of an observation space, if it has finite ones."""
-    if not isinstance(space, Box):
-        return None
-    low, high = space.low.astype(np.float64).ravel(), space.high.astype(np.float64).ravel()
-    return (low, high) if np.isfinite(high - low).all() else None
-
-
-def _same(feature: Array, observation: Array) -> bool:
-    """Return whether both are the same numbers; observations are often rounded to float32."""
-    return np.array_equal(feature.astype(np.float32), observation.astype(np.float32))

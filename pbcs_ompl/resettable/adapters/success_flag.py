@@ -9,7 +9,11 @@ from pbcs_ompl.core.errors import NotResettable
 from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.attributes import EnvAttributes
+from pbcs_ompl.resettable.bounds import widened
+from pbcs_ompl.resettable.observations import flat_bounds
+from pbcs_ompl.resettable.observing import missing_observe, observed_type, reset_options, state_observer
 from pbcs_ompl.resettable.sampling import uniform_in_ball
+from pbcs_ompl.resettable.task_env import bare
 
 
 class SuccessFlagEnv(gymnasium.Env[Array, Array]):
@@ -34,13 +38,14 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
         self.spec, self.render_mode = inner.spec, inner.render_mode
         self.action_space, self.observation_space = inner.action_space, inner.observation_space
         self._success = 0.0
-        observation, _ = inner.reset(seed=0)
+        observe = state_observer(inner, offers)
+        if observe is None:
+            raise missing_observe(inner)
+        self._observe = observe
+        inner.reset(seed=0)
         state = as_vector(inner, inner.get_env_state())
-        self._observes_state = observes_state(observation, state)
-        low, high = state_bounds(inner, offers, state, self._observes_state)
+        low, high = state_bounds(inner, offers, state)
         self.state_low, self.state_high = np.append(low, 0.0), np.append(high, 1.0)
-        if offers.observe is None and not self._observes_state:
-            raise NotResettable(missing_observe(inner))
         self.capabilities = offers.restores
         self.feature_dims = tuple(range(len(state))) if offers.feature_dims is None else offers.feature_dims
         # What the environment offers itself; `EnvAttributes` takes None for what is not offered.
@@ -72,17 +77,19 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
 
     def observe(self, states: Array) -> Array:
         """Return the observations [B, O] of states [B, N + 1]."""
-        inner = np.array(states, dtype=np.float64)[:, :-1].copy()
-        return inner if self._offers.observe is None else self._offers.observe(inner)
+        return self._observe(np.array(states, dtype=np.float64)[:, :-1])
 
     def goal_distance(self, states: Array) -> Array:
         """Return 0 for successes, 1 for other states [B]."""
         return 1.0 - np.asarray(states, dtype=np.float64)[:, -1]
 
     def is_valid(self, states: Array) -> BoolArray:
-        """Return which states [B, N + 1] the environment calls valid [B]; within the bounds, where it says nothing."""
+        """Return which states [B, N + 1] the environment calls valid [B]; within the bounds, where it says nothing.
+
+        Whatever the flag: EST draws states near others until one is valid, and a drawn flag is never 0 or 1.
+        """
         states = np.asarray(states, dtype=np.float64)
-        flagged: BoolArray = (states[:, -1] == 0.0) | (states[:, -1] == 1.0)
+        flagged: BoolArray = (states[:, -1] >= 0.0) & (states[:, -1] <= 1.0)
         if self._offers.is_valid is not None and flagged.any():
             flagged[flagged] = self._offers.is_valid(states[flagged, :-1].copy())
         return flagged
@@ -120,42 +127,33 @@ def as_vector(env: Any, state: Any) -> Array:
         NotResettable: it is none.
     """
     if not isinstance(state, np.ndarray | list | tuple) or np.ndim(state) != 1:
-        raise NotResettable(f"{type(env).__name__}.get_env_state() returned a {type(state).__name__}; "
+        raise NotResettable(f"{_name(env)}.get_env_state() returned a {type(state).__name__}; "
                             f"expected a vector of numbers")
     return np.array(state, dtype=np.float64)
 
 
-def observes_state(observation: Any, state: Array) -> bool:
-    """Return whether an observation is the state itself."""
-    return np.shape(observation) == state.shape and bool(np.array_equal(state, observation))
-
-
-def missing_observe(env: Any) -> str:
-    """Return the message for an environment whose states cannot be observed."""
-    return (f"{type(env).__name__}: the observation is not the state, so implement "
-            f"`observe(states [B, D]) -> observations [B, O]`")
-
-
-def state_bounds(env: Any, offers: EnvAttributes, state: Array, observes: bool) -> tuple[Array, Array]:
-    """Return the bounds of the state [N] that the environment declares, else those of its observations.
+def state_bounds(env: Any, offers: EnvAttributes, state: Array) -> tuple[Array, Array]:
+    """Return the bounds of the state [N] that the environment declares, else those of its observations, if it is one.
 
     Args:
         env: The environment.
         offers: Its optional attributes.
         state: One of its states [N].
-        observes: Whether the observation is the state.
 
     Raises:
         NotResettable: there are none, or they have another length.
     """
-    box = env.observation_space
     if offers.state_low is not None and offers.state_high is not None:
-        low, high = np.asarray(offers.state_low), np.asarray(offers.state_high)
-    elif observes and np.isfinite(box.low).all() and np.isfinite(box.high).all():
-        low, high = box.low, box.high
+        low, high = widened(offers.state_low, -np.inf), widened(offers.state_high, np.inf)
     else:
-        raise NotResettable(f"{type(env).__name__}: the bounds of its {len(state)} state dimensions are "
-                            f"unknown; set `state_low` and `state_high`")
+        low, high = flat_bounds(bare(env).observation_space)
+        if not np.isfinite(high - low).all() or observed_type(bare(env), reset_options(env)) is None:
+            raise NotResettable(f"{_name(env)}: the bounds of its {len(state)} state dimensions are "
+                                f"unknown; set `state_low` and `state_high`")
     if low.shape != state.shape:
-        raise NotResettable(f"{type(env).__name__}: state_low has {low.size} dimensions, the state has {len(state)}")
+        raise NotResettable(f"{_name(env)}: state_low has {low.size} dimensions, the state has {len(state)}")
     return low, high
+
+
+def _name(env: Any) -> str:
+    return type(bare(env)).__name__

@@ -10,12 +10,12 @@ from textwrap import shorten
 from typing import Any
 
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.formatting import format_duration, format_interval, format_number, format_rate, format_seeds
 from pbcs_ompl.experiments.compare import Comparison, read_comparison
 from pbcs_ompl.experiments.study import study_ids
 from pbcs_ompl.results.files import RUNS, read_json
 from pbcs_ompl.results.folder import Folder
+from pbcs_ompl.results.schema import RunOfStudy
 
 UNFINISHED = "not finished"
 MOST_RUNS = 200
@@ -76,7 +76,6 @@ def read_content(folder: Folder) -> Content:
 
     Raises:
         DamagedFile: a record in it is damaged.
-        KeyError, TypeError: its settings or its result are not those of this version.
     """
     readers: dict[str, Callable[[Folder], Content]] = {
         "plan": _plan, "train": _training, "eval": _evaluation, "compare": _comparison, "study": _study}
@@ -181,9 +180,7 @@ def _study(folder: Folder) -> Content:
     seeds: set[int] = set()
     outlines = []
     for file in files:
-        record = read_json(file)
-        if not isinstance(record, dict):
-            raise DamagedFile(f"{file} is damaged: expected a JSON object")
+        record = read_json(file, RunOfStudy, finite=False)
         seeds.update([record["seed"]] if isinstance(record.get("seed"), int) else record.get("seeds", []))
         outlines.append(_outline({"run": file.stem} | record))
     study, result = folder.config["study"], folder.result

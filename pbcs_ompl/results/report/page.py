@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from pbcs_ompl.core.errors import DamagedFile, RunFolderError
+from pbcs_ompl.core.errors import DamagedFile, PbcsError, RunFolderError
 from pbcs_ompl.core.formatting import format_number, format_value
+from pbcs_ompl.core.utf8 import utf8
 from pbcs_ompl.results.files import write_atomically
 from pbcs_ompl.results.folder import find_folders
 from pbcs_ompl.results.report.section import DAMAGED, Section, damaged_section, make_section
@@ -46,32 +47,59 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Report:
         folder: A result folder, or one that holds many.
         out: The page; report.html in `folder` by default. A report that is there already is replaced.
 
+    Nothing that a folder names is imported, and no link out of a folder is followed.
+
     Raises:
         RunFolderError: no results in `folder`; or `out` is not a report, or cannot be written.
         DamagedFile: `folder` is a result folder with a damaged file. One among many is reported on the page.
     """
     root = Path(folder)
     paths = find_folders(root)
-    page = root / REPORT if out is None else Path(out)
+    page, single = root / REPORT if out is None else Path(out), paths == [root]
     _check_replaceable(page)
-    sections = [make_section(root, root)] if paths == [root] else [_section(path, root) for path in paths]
-    stream = _template().generate(
-        sections=sections, single=paths == [root], root=str(root), generator=GENERATOR, version=version("pbcs-ompl"),
-        now=datetime.now().astimezone().isoformat(sep=" ", timespec="minutes"))
-    write_atomically(page, lambda file: file.writelines(part.encode() for part in stream))
+    templates = _templates()
+    shown = [_shown(path, root, number, templates, single) for number, path in enumerate(paths, start=1)]
+    sections = [section for section, _ in shown]
+    stream = templates.get_template("report.html").generate(
+        sections=sections, texts=[text for _, text in shown], single=single, root=str(root), generator=GENERATOR,
+        version=version("pbcs-ompl"), now=datetime.now().astimezone().isoformat(sep=" ", timespec="minutes"))
+    write_atomically(page, lambda file: file.writelines(utf8(part) for part in stream))
     return Report(page, sections)
 
 
-def _section(path: Path, root: Path) -> Section:
+def _shown(path: Path, root: Path, number: int, templates: Environment, single: bool) -> tuple[Section, str]:
+    """Return the section of a folder, and its text; whatever is wrong with one of many costs only its own section.
+
+    Args:
+        path: The folder.
+        root: That of the report.
+        number: Its place on the page, from 1.
+        templates: Ours.
+        single: Whether it is the only folder.
+
+    Raises:
+        DamagedFile: it is the only folder, and cannot be shown.
+    """
+    text = templates.get_template("section.html").module.section  # type: ignore[attr-defined]
     try:
-        return make_section(path, root)
-    except DamagedFile as error:
-        return damaged_section(path, root, error)
+        section = make_section(path, root)
+        return section, text(section, number, single)
+    except PbcsError as error:
+        if single:
+            raise
+        section = damaged_section(path, root, str(error))
+    except Exception as error:  # whatever a folder of another person may hold
+        if single:
+            raise DamagedFile(f"{path} cannot be shown: {error!r}") from error
+        section = damaged_section(path, root, f"{path} cannot be shown: {error!r}")
+    return section, text(section, number, single)
 
 
 def _check_replaceable(page: Path) -> None:
     if page.is_dir():
         raise RunFolderError(f"cannot write {page}: it is a folder; name a file")
+    if page.exists() and not page.is_file():
+        raise RunFolderError(f"cannot write {page}: it is no regular file; choose another --out")
     if page.exists() and GENERATOR.encode() not in _head(page):
         raise RunFolderError(f"{page} was not written by pbcs report; choose another --out, or remove it first")
 
@@ -81,11 +109,11 @@ def _head(page: Path) -> bytes:
         return file.read(HEAD_BYTES)
 
 
-def _template() -> Any:
+def _templates() -> Environment:
     environment = Environment(loader=PackageLoader("pbcs_ompl.results.report"), autoescape=True,
                               undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {"cell": _cell, "format_value": format_value}
-    return environment.get_template("report.html")
+    return environment
 
 
 def _cell(value: Any) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.registry import names
+from pbcs_ompl.core.trust import is_module_name
 from pbcs_ompl.experiments.study import SWEEP, study_folders
 from pbcs_ompl.resettable.make import is_known
 from pbcs_ompl.results.command_line import (
@@ -21,6 +22,8 @@ from pbcs_ompl.results.command_line import (
 )
 from pbcs_ompl.results.files import CHECKPOINT, PLAN, TRAJECTORY, read_json, read_toml
 from pbcs_ompl.results.folder import Folder
+from pbcs_ompl.results.schema import PlanEffort
+from pbcs_ompl.skills.config import config_modules
 
 
 def repeating(folder: Folder) -> str:
@@ -40,7 +43,8 @@ def repeating(folder: Folder) -> str:
 def resuming(folder: Folder) -> str:
     """Return the command that resumes a run that has not ended; "" for one that has."""
     if folder.kind == "train" and (folder.result is None or (folder.path / CHECKPOINT).is_file()):
-        return command(resume_words(folder.path, 2 * folder.config["max_transitions"] if folder.result else None))
+        budget = 2 * folder.config["max_transitions"] if folder.result else None
+        return command(resume_words(folder.path, budget, trust=_names_modules(folder.config)))
     if folder.kind in ("compare", "study") and folder.result is None and repeating(folder).startswith("pbcs "):
         return command([*_words(folder), "--out", str(folder.path)])
     return ""
@@ -52,13 +56,22 @@ def _is_available(folder: Folder) -> bool:
     planners = [config["planner"]] if "planner" in config else config.get("planners", [])
     agents = [config["agent"]] if folder.kind == "train" else []
     return folder.kind == "study" or (
-        all(is_known(EnvSpec.from_dict(one).id) for one in environments)
+        all(_is_environment(EnvSpec.from_dict(one).id) for one in environments)
         and all(_is_registered("agent", name) for name in agents)
         and all(_is_registered("planner", name) for name in planners))
 
 
+def _names_modules(config: dict[str, Any]) -> bool:
+    return bool(config_modules(config) or EnvSpec.from_dict(config["environment"]).modules)
+
+
+def _is_environment(env_id: str) -> bool:
+    """Return whether an id can be typed; a module that it names is not imported to see whether it is there."""
+    return is_module_name(env_id) or is_known(env_id)
+
+
 def _is_registered(kind: str, name: str) -> bool:
-    return ":" in name or name.lower() in map(str.lower, names(kind))
+    return is_module_name(name) or name.lower() in map(str.lower, names(kind))
 
 
 def _fits_command_line(config: dict[str, Any]) -> bool:
@@ -72,7 +85,8 @@ def _words(folder: Folder) -> Words:
     words: dict[str, Callable[[], Words]] = {
         "plan": lambda: plan_words(config),
         "train": lambda: train_words(config, _given_trajectory(folder.path)),
-        "eval": lambda: eval_words(config["chain"], episodes=config["episodes"], epsilon=config["epsilon"]),
+        "eval": lambda: eval_words(config["chain"], episodes=config["episodes"], epsilon=config["epsilon"],
+                                   trust=bool(EnvSpec.from_dict(config["environment"]).modules)),
         "compare": lambda: compare_words(config),
         "study": lambda: _study_words(config)}
     return words[folder.kind]()
@@ -80,7 +94,7 @@ def _words(folder: Folder) -> Words:
 
 def _given_trajectory(folder: Path) -> Path | None:
     """Return the trajectory that a training was given; None where it was planned, which takes a transition at least."""
-    given = (folder / PLAN).is_file() and read_json(folder / PLAN)["transitions"] == 0
+    given = (folder / PLAN).is_file() and read_json(folder / PLAN, PlanEffort)["transitions"] == 0
     return folder / TRAJECTORY if given else None
 
 
@@ -88,7 +102,9 @@ def _study_words(config: dict[str, Any]) -> Words:
     """Return nothing if no study that is available has this name and this sweep: it would be another study."""
     sweep = {key: value for key, value in config.items() if key not in ("kind", "study", "folder", "seeds")}
     places = [(name, place) for name, place in study_folders().items() if name == config["study"]]
-    places += [(config["folder"], Path(config["folder"]))] if "folder" in config else []
+    if "folder" in config:
+        folder = Path(config["folder"]).expanduser()
+        places.append((str(folder), folder))
     device = {key: sweep[key] for key in ("device",) if key in sweep}  # the only value that an option replaces
     words = [word for word, place in places if (place / SWEEP).is_file() and _sweep(place) | device == sweep]
     return study_words(words[0], seeds=config.get("seeds"), **device) if words else []

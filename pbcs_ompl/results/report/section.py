@@ -2,12 +2,13 @@
 
 import base64
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 from PIL import Image
 
 from pbcs_ompl.core.errors import DamagedFile
-from pbcs_ompl.results.files import CONFIG, FIGURES
+from pbcs_ompl.results.files import CONFIG, FIGURES, RUNS, read_bytes
 from pbcs_ompl.results.folder import read_folder
 from pbcs_ompl.results.report.contents import Content, Table, read_content
 from pbcs_ompl.results.report.repeat import repeating, resuming
@@ -33,13 +34,15 @@ def read_figure(path: Path) -> Figure:
     """Return the picture in a file.
 
     Raises:
-        DamagedFile: it is no PNG.
+        DamagedFile: it is no PNG, or one of its checksums is wrong.
     """
     try:
-        with Image.open(path, formats=["PNG"]) as image:
-            return Figure(path, *image.size)
-    except OSError as error:
+        with Image.open(BytesIO(read_bytes(path)), formats=["PNG"]) as image:
+            size = image.size
+            image.verify()
+    except Exception as error:  # Pillow raises SyntaxError among others
         raise DamagedFile(f"{path} is damaged: not a PNG") from error
+    return Figure(path, *size)
 
 
 @dataclass(frozen=True)
@@ -72,20 +75,29 @@ def make_section(path: Path, root: Path) -> Section:
     Raises:
         DamagedFile: a file in it is damaged.
     """
+    pictures = sorted([*path.glob("*.png"), *path.glob(f"{FIGURES}/*.png")])
+    _check_inside(path, [*path.glob("*.json"), *path.glob("*.toml"), *path.glob(f"{RUNS}/**/*.json"), *pictures])
     folder = read_folder(path)
-    try:
-        content, repeat, resume = read_content(folder), repeating(folder), resuming(folder)
-    except (KeyError, TypeError) as error:
-        raise DamagedFile(f"{path} is not the folder of a {folder.kind} as this version writes it: "
-                          f"{error!r}") from error
-    pictures = [*path.glob("*.png"), *path.glob(f"{FIGURES}/*.png")]
-    return Section(_name(path, root), folder.kind, content, [read_figure(picture) for picture in sorted(pictures)],
-                   (path / CONFIG).read_text(), _versions(folder.provenance), repeat, resume)
+    return Section(_name(path, root), folder.kind, read_content(folder), [read_figure(picture) for picture in pictures],
+                   read_bytes(path / CONFIG).decode("utf-8"), _versions(folder.provenance), repeating(folder),
+                   resuming(folder))
 
 
-def damaged_section(path: Path, root: Path, error: DamagedFile) -> Section:
+def _check_inside(folder: Path, files: list[Path]) -> None:
+    """Refuse links that lead out of a folder: the folder of another person must not show what is on this machine.
+
+    Raises:
+        DamagedFile: there is one.
+    """
+    inside = folder.resolve()
+    for file in files:
+        if not file.resolve().is_relative_to(inside):
+            raise DamagedFile(f"{file} is a link that leads out of {folder}; it is not followed")
+
+
+def damaged_section(path: Path, root: Path, reason: str) -> Section:
     """Return the section of a folder that cannot be read, among others that can."""
-    content = Content("A folder that cannot be read", DAMAGED, False, [], failures=[(DAMAGED, str(error))])
+    content = Content("A folder that cannot be read", DAMAGED, False, [], failures=[(DAMAGED, reason)])
     return Section(_name(path, root), DAMAGED, content, [], "", _versions([]), "", "")
 
 

@@ -1,6 +1,7 @@
 """The log is what OMPL's own reader takes, and the database it makes holds every number of the records."""
 
 import json
+import platform
 import sqlite3
 from pathlib import Path
 
@@ -109,3 +110,11 @@ def test_the_log_says_the_same_to_the_command_of_ompl(sweep, records, tmp_path, 
 def test_folder_that_cannot_be_written():
     with pytest.raises(RunFolderError, match="cannot write"):
         write_database(Path("/nowhere/c.db"), [])
+
+
+def test_what_is_published_names_no_machine_and_can_be_read_by_others(sweep, records, tmp_path):
+    (log,) = write_logs(tmp_path, sweep, records)[:1]
+    write_database(tmp_path / "c.db", [log])
+    assert f"Running on {platform.machine()}" in log.read_text()
+    assert platform.node() == platform.machine() or platform.node() not in log.read_text().split()
+    assert (tmp_path / "c.db").stat().st_mode == log.stat().st_mode

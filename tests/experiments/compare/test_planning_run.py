@@ -28,8 +28,8 @@ def test_a_record_has_everything_and_is_plain():
     assert None not in [record[name] for name in MEASURED]
     assert json.loads(json.dumps(record)) == record
     assert folder_of(record) == "1-Maze-v0"
-    assert is_record_of(RUN.name, record)
-    assert is_record_of(RUN.name, failed)
+    assert is_record_of(RUN, record)
+    assert is_record_of(RUN, failed)
     assert (failed["reason"], failed["seconds"]) == ("why not", None)
     assert record["planner_settings"]["bin_size"] == [0.15, 0.15]
 

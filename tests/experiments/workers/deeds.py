@@ -57,6 +57,8 @@ def misuse(_):
     raise PbcsError("this deed does not exist")
 
 
+if "DEEDS_FAIL" in os.environ:
+    raise RuntimeError("deeds cannot be imported")
 time.sleep(float(os.environ.get("SECONDS_TO_IMPORT", "0")))
 KEPT: list[bytearray] = []
 DEEDS = {

@@ -6,6 +6,7 @@ import sys
 from collections import Counter
 from contextlib import closing
 from multiprocessing.connection import wait
+from pathlib import Path
 
 import psutil
 import pytest
@@ -16,6 +17,7 @@ from hypothesis import strategies as st
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.experiments.run import Failure
 from pbcs_ompl.experiments.workers import Limits, executors, make_executor
+from pbcs_ompl.experiments.workers.start import CannotStart
 
 
 def execute(runs, jobs=1, **limits):
@@ -113,12 +115,25 @@ def test_processes_end_with_their_parent_for_whatever_reason(tmp_path, sent):
     assert psutil.wait_procs(children, timeout=20)[1] == []
 
 
-def test_a_script_without_a_guard_gets_a_message_that_says_so(tmp_path):
-    (tmp_path / "main.py").write_text(PROGRAM.replace('if __name__ == "__main__"', "if True")
-                                      .replace('found["value"]', "found"))
+def test_a_script_without_a_guard_is_one_error_and_no_result(tmp_path):
+    (tmp_path / "main.py").write_text(PROGRAM.replace('if __name__ == "__main__"', "if True"), encoding="utf-8")
     shown = subprocess.run([sys.executable, str(tmp_path / "main.py")], capture_output=True, text=True, timeout=60)
-    assert "a script without if __name__ == '__main__'" in shown.stdout
-    assert shown.stdout.count("reason") == 3
+    assert "cannot start workers: the process died, exit status 1" in shown.stderr.splitlines()[-1]
+    assert "if __name__ == '__main__':" in shown.stderr.splitlines()[-1]
+    assert shown.stdout == ""
+
+
+def test_a_script_without_a_file_is_refused_before_anything_starts():
+    shown = subprocess.run([sys.executable, "-"], input=PROGRAM, capture_output=True, text=True, timeout=60,
+                           cwd=Path(__file__).parent)
+    assert "cannot start workers: the running script '<stdin>' is no file" in shown.stderr.splitlines()[-1]
+    assert shown.stdout == ""
+
+
+def test_a_function_that_cannot_be_imported_is_one_error(monkeypatch):
+    monkeypatch.setenv("DEEDS_FAIL", "1")
+    with pytest.raises(CannotStart, match="RuntimeError: deeds cannot be imported"):
+        execute([deed("square", 1), deed("square", 2)], jobs=2)
 
 
 def test_the_parent_sleeps_until_a_worker_sends_something(monkeypatch):

@@ -21,7 +21,7 @@ from pbcs_ompl.results.report.repeat import repeating, resuming
 from pbcs_ompl.skills.config import TrainConfig
 
 
-class Caught(Exception):
+class Caught(BaseException):
     """The verb has called the library."""
 
 

@@ -1,0 +1,162 @@
+"""Where a skill starts, seen from outside: activation sets as functions of the observation.
+
+Training works on states. A controller outside of the simulator has observations only, so each activation set gets a
+counterpart that needs nothing else. The success of a chain is measured with these.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.optimize import nnls
+
+from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, BoolArray
+from pbcs_ompl.skills.activation_sets import ClassifierSet, probability
+
+TOLERANCE = 0.02
+"""Largest error of an observed distance, as a fraction of the radius."""
+
+
+class ObservedSet(Protocol):
+    """A set of observations."""
+
+    def contains(self, observations: Array) -> BoolArray:
+        """Return which of the observations [B, O] lie in the set [B]."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedBall:
+    """The observations o with sqrt(sum_k w_k (o_k - center_k)^2) <= radius.
+
+    Attributes:
+        center: The observation in the middle [O].
+        weights: w [O], at least 0: see `observed_metric`.
+        radius: In the distance of the states.
+    """
+
+    center: Array
+    weights: Array
+    radius: float
+
+    def contains(self, observations: Array) -> BoolArray:
+        """Return which of the observations [B, O] lie in the ball [B]."""
+        inside: BoolArray = (observations - self.center) ** 2 @ self.weights <= self.radius ** 2
+        return inside
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedClassifier:
+    """The observations that a network thinks to be in the set; see `activation_sets.ClassifierSet`.
+
+    Attributes:
+        confidence: Probability from which an observation belongs to the set.
+        origin, scale: Mean and deviation of the observations it was learnt from [O].
+        weights_1, bias_1, weights_2, bias_2: The network, [O, H], [H], [H, 1], [1].
+    """
+
+    confidence: float
+    origin: Array
+    scale: Array
+    weights_1: Array
+    bias_1: Array
+    weights_2: Array
+    bias_2: Array
+
+    @classmethod
+    def of(cls, learnt: ClassifierSet) -> "ObservedClassifier":
+        """Return the network of a learnt activation set."""
+        return cls(**{field.name: getattr(learnt, field.name) for field in fields(cls)})
+
+    def contains(self, observations: Array) -> BoolArray:
+        """Return which of the observations [B, O] lie in the set [B]."""
+        chances = probability(observations, self.origin, self.scale, self.weights_1, self.bias_1, self.weights_2,
+                              self.bias_2)
+        inside: BoolArray = chances >= self.confidence
+        return inside
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """Where a controller hands over to a skill: in all of some sets; everywhere, where there are none."""
+
+    parts: tuple[ObservedBall | ObservedClassifier, ...] = ()
+
+    def contains(self, observations: Array) -> BoolArray:
+        """Return which of the observations [B, O] lie in all sets [B]."""
+        inside = np.ones(len(observations), dtype=np.bool_)
+        for part in self.parts:
+            inside &= part.contains(observations)
+        return inside
+
+
+def observed_metric(model: ResettableModel, states: Array, radius: float) -> Array | None:
+    """Return weights w [O] with d(s, s')^2 = sum_k w_k (o_k(s) - o_k(s'))^2 for the distance d of states.
+
+    They are fitted, not below 0, to half of the pairs of states, and have to hold for the other half to a fraction of
+    `radius`. They exist where the position, say, is an entry of the observation, whatever its place and unit.
+
+    Args:
+        model: It knows distances and observations.
+        states: States [N, D] all around the plan.
+        radius: The largest distance that matters.
+
+    Returns:
+        The weights; None where there are none, because the observation leaves out what the distance is made of, or
+        shows it in another way.
+    """
+    observations = model.observe(states)
+    first, second = np.triu_indices(len(states), 1)
+    squares = (observations[first] - observations[second]) ** 2
+    distances = model.distance(states[first], states[second])
+    fitted = np.arange(len(first)) % 2 == 0
+    unit = np.maximum(squares.max(axis=0), 1e-12)  # of each entry, for the fit
+    weights = nnls(squares[fitted] / unit, distances[fitted] ** 2)[0] / unit
+    near = distances <= 4.0 * radius
+    error = np.abs(np.sqrt(squares[near] @ weights) - distances[near])
+    exact: bool = bool(near.any() and (error <= TOLERANCE * radius).all())
+    return weights if exact else None
+
+
+def observed_ball(model: ResettableModel, center: Array, radius: float, weights: Array) -> ObservedBall:
+    """Return the ball around the observation of a state [D]."""
+    return ObservedBall(model.observe(center[None])[0], weights, radius)
+
+
+KINDS: dict[str, type[Any]] = {"ball": ObservedBall, "classifier": ObservedClassifier}
+"""What a file may hold, by the name it has there."""
+
+
+def entry_kinds(entry: Entry) -> list[str]:
+    """Return the names of the kinds of its parts."""
+    return [next(name for name, kind in KINDS.items() if type(part) is kind) for part in entry.parts]
+
+
+def entry_to_arrays(entry: Entry, name: str) -> dict[str, np.ndarray]:
+    """Return the parts of an entry as arrays called "<name>.<part>.<attribute>"."""
+    return {f"{name}.{index}.{field.name}": np.asarray(getattr(part, field.name))
+            for index, part in enumerate(entry.parts) for field in fields(part)}
+
+
+def entry_from_arrays(kinds: list[str], arrays: Mapping[str, np.ndarray], name: str) -> Entry:
+    """Return the entry of `entry_to_arrays`.
+
+    Args:
+        kinds: Those of its parts, as `entry_kinds` returns them.
+        arrays: Those of `entry_to_arrays`, perhaps among others.
+        name: The one that was given to `entry_to_arrays`.
+
+    Raises:
+        DamagedFile: an array is missing, or there is no such kind.
+    """
+    parts = []
+    for index, kind in enumerate(kinds):
+        try:
+            values = {field.name: arrays[f"{name}.{index}.{field.name}"] for field in fields(KINDS[kind])}
+        except KeyError as error:
+            raise DamagedFile(f"{name}, a set of the kind {kind!r}, lacks {error}") from error
+        parts.append(KINDS[kind](**{key: value if value.ndim else float(value) for key, value in values.items()}))
+    return Entry(tuple(parts))
