@@ -23,6 +23,7 @@ from pbcs_ompl.resettable.attributes import misspelt
 from pbcs_ompl.resettable.branching import LONG, first_difference
 from pbcs_ompl.resettable.make import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.resettable.supported import task_maker
 
 STEPS = 30
 
@@ -186,9 +187,10 @@ class _Trial:
                          reset_options=spec.reset_options).env
 
     def branches(self) -> str:
-        if self.model.make_env is None:
+        make_inner = task_maker(self.model.make_env, self.model.spec.reset_options)
+        if make_inner is None:
             return ""
-        return first_difference(self.env, self.model.make_env, steps=LONG, seed=self.seed + 1)
+        return first_difference(self.env, make_inner, steps=LONG, seed=self.seed + 1)
 
     def spelling(self) -> str:
         return "; ".join(f"{name!r} is not read; did you mean {meant!r}?"

@@ -14,6 +14,7 @@ from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.resettable.memory.generators import drawn, states
 from pbcs_ompl.resettable.memory.owned import Owned, Path, look, text_of
 from pbcs_ompl.resettable.memory.plain_values import is_plain, same, to_text
+from pbcs_ompl.resettable.task_env import bare
 
 SEEDS = (0, 1, 2, 0)
 STEPS = 40
@@ -59,8 +60,8 @@ class Changes:
     """What of an environment has changed, by path; `add` after every reset and step."""
 
     def __init__(self, env: Any):
-        self._env = env
-        self.owned: Owned = look(env)
+        self._env = bare(env)
+        self.owned: Owned = look(self._env)
         self._generators = states(self.owned.generators)
         self.plain = {path: Seen(value) for path, value in self.owned.plain.items()}
         self._opaque = {path: (value, fingerprint(value)) for path, value in self.owned.opaque.items()}
@@ -103,7 +104,7 @@ def _first_names(plain: dict[Path, Any]) -> dict[Path, Path]:
 
 def plain_copies(env: Any) -> dict[Path, Any]:
     """Return copies of the plain values that an environment owns, by path."""
-    return {path: deepcopy(value) for path, value in look(env).plain.items()}
+    return {path: deepcopy(value) for path, value in look(bare(env)).plain.items()}
 
 
 def episodes(env: gymnasium.Env[Any, Any], seeds: tuple[int, ...] = SEEDS, steps: int = STEPS) -> Iterator[Event]:
