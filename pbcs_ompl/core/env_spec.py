@@ -7,6 +7,7 @@ from typing import Annotated, Any, NotRequired, TypedDict
 
 import msgspec
 
+from pbcs_ompl.core.checked import check_fields
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption
 from pbcs_ompl.core.plain import from_nulls, plain, to_nulls
 from pbcs_ompl.core.trust import is_module_name, module_names, refuse_modules
@@ -39,7 +40,7 @@ class EnvSpec:
         trusted: Whether modules that it names may be imported: they were typed by the user, not read from a file.
 
     Raises:
-        InvalidOption: `start_seed` is no integer >= 0, `max_episode_steps` none >= 1, or `reset_options` no dictionary.
+        InvalidOption: a value has another type, `start_seed` is not >= 0, or `max_episode_steps` not >= 1.
     """
 
     id: str
@@ -52,10 +53,9 @@ class EnvSpec:
     trusted: bool = field(default=True, compare=False, repr=False)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         _check_integer("start_seed", self.start_seed, 0)
         _check_integer("max_episode_steps", self.max_episode_steps, 1)
-        if not isinstance(self.reset_options, dict | None):
-            raise InvalidOption(f"reset_options is {self.reset_options!r}; expected a dictionary")
 
     def reset_seed(self, seed: int | None) -> int | None:
         """Return the seed of the reset in an episode that was given `seed`."""

@@ -8,6 +8,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from pbcs_ompl.core.callbacks import code_of_others
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.types import ProgressCallback
@@ -57,6 +59,7 @@ class Comparison:
         return {"rows": self.rows, "tests": self.tests, "database": self.database}
 
 
+@checked
 def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | Sequence[Environment], *,
             env_kwargs: Options | Sequence[Options] | None = None, goal: str | None = None,
             feature: str | None = None, start_seed: int | None = None,
@@ -182,8 +185,9 @@ class _Progress:
             self._ended[key] += record["seconds"] is not None
         if self._on_progress is not None:
             runs = sum(len(numbers) for numbers in self._transitions.values())
-            self._on_progress({"runs": runs, "solved": sum(self._solved.values()),
-                               "table": [*map(self._row, self._solved)]})
+            with code_of_others("on_progress"):
+                self._on_progress({"runs": runs, "solved": sum(self._solved.values()),
+                                   "table": [*map(self._row, self._solved)]})
 
     def add_one(self, found: Record | Failure) -> None:
         """Count the record of a run that has just ended; failed runs have one, too."""

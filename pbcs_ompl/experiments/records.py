@@ -5,6 +5,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from pbcs_ompl.core.callbacks import code_of_others
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
 from pbcs_ompl.experiments.workers import Executor, Limits
@@ -68,7 +69,9 @@ def make_missing_runs(runs: Sequence[Run], function: RunFunction, known: Mapping
     """
     records, failures = dict(known), {}
     missing = [run for run in runs if run.name not in records]
-    with closing(executor(missing, function, limits)) as ended:
+    with code_of_others("the executor"):
+        running = executor(missing, function, limits)
+    with closing(running) as ended:
         for run, found in ended:
             if isinstance(found, Failure) and failed_record is not None:
                 found = failed_record(run, found)

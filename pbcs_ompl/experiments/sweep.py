@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium
+import numpy as np
 
 from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.bridge.problem import make_problem
@@ -16,7 +17,7 @@ from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.types import Counter
-from pbcs_ompl.experiments.run import Run
+from pbcs_ompl.experiments.run import Run, check_number_of_seeds
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.make import is_known
 from pbcs_ompl.results.provenance import planning_versions
@@ -92,7 +93,9 @@ def make_sweep(planners: Sequence[str] | Mapping[str, Options], environments: Se
         UnknownName, NotResettable, UnsupportedSpace: a planner or an environment cannot be made.
     """
     options = dict(planners) if isinstance(planners, Mapping) else {name: {} for name in planners}
-    chosen = list(range(seeds)) if isinstance(seeds, int) else [int(seed) for seed in seeds]
+    if not isinstance(seeds, Sequence | np.ndarray):
+        seeds = range(check_number_of_seeds(int(seeds)))
+    chosen = [int(seed) for seed in seeds]
     _check_unique("planners", list(planners))
     _check_unique("environments", [environment.label for environment in environments])
     _check_unique("seeds", chosen)

@@ -1,5 +1,6 @@
 """Is an environment resettable? A companion of Gymnasium's `check_env`."""
 
+import warnings
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ import gymnasium
 import numpy as np
 
 from pbcs_ompl.core.callbacks import describe
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, PbcsError, UnknownName
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -18,6 +20,7 @@ from pbcs_ompl.resettable.adapt import adapt
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.attributes import misspelt
+from pbcs_ompl.resettable.branching import LONG, first_difference
 from pbcs_ompl.resettable.make import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 
@@ -74,6 +77,7 @@ class _Roll:
         return ""
 
 
+@checked
 def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
                      env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
                      feature: str | FeatureRule | None = None, start_seed: int | None = None,
@@ -108,6 +112,7 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
         ("a restored state continues as before", trial.restored),
         ("the same after other steps and another reset", trial.disturbed),
         ("the same in a second instance", trial.elsewhere),
+        ("branches continue as in fresh instances", trial.branches),
         ("returned arrays are copies", trial.copies),
         ("optional attributes have the names that are read", trial.spelling),
         ("transition equals step", trial.transition_is_step),
@@ -131,7 +136,7 @@ class _Trial:
     """The checks on one model; each returns what it found wrong, or an empty string."""
 
     def __init__(self, model: Any, seed: int):
-        self.model = model
+        self.model, self.seed = model, seed
         self.env: Any = model.env
         self.actions = ActionMap.of(model.env.action_space)
         rng = np.random.default_rng(seed)
@@ -165,15 +170,25 @@ class _Trial:
         return self.first.difference(self.roll(self.env, self.start))
 
     def elsewhere(self) -> str:
-        if self.model.make_env is None:
-            return self.first.difference(self.roll(deepcopy(self.env), self.start))
-        spec = self.model.spec
-        other: Any = adapt(self.model.make_env(), goal=spec.goal, feature=spec.feature,
-                           reset_options=spec.reset_options).env
-        other.reset(seed=54321, options=spec.reset_options)
+        other = self._second()
+        other.reset(seed=54321)
         found = self.first.difference(self.roll(other, self.start))
         other.close()
         return found
+
+    def _second(self) -> Any:
+        if self.model.make_env is None:
+            return deepcopy(self.env)
+        spec = self.model.spec
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the first instance has warned
+            return adapt(self.model.make_env(), goal=spec.goal, feature=spec.feature,
+                         reset_options=spec.reset_options).env
+
+    def branches(self) -> str:
+        if self.model.make_env is None:
+            return ""
+        return first_difference(self.env, self.model.make_env, steps=LONG, seed=self.seed + 1)
 
     def spelling(self) -> str:
         return "; ".join(f"{name!r} is not read; did you mean {meant!r}?"

@@ -38,9 +38,13 @@ MOST_BYTES, MOST_ARRAY_BYTES, MOST_ARRAYS = 1 << 28, 1 << 33, 100_000
 
 @contextmanager
 def write_errors(path: Path) -> Iterator[None]:
-    """Turn an OSError while writing below `path` into a RunFolderError of one line."""
+    """Turn an OSError while writing below `path`, or a name that no file has, into a RunFolderError of one line."""
     try:
+        if b"\0" in os.fsencode(path):
+            raise RunFolderError(f"{str(path)!a} is no name of a file: it holds a null byte")
         yield
+    except UnicodeEncodeError as error:
+        raise RunFolderError(f"{str(path)!a} is no name of a file: {error.reason}") from error
     except OSError as error:
         if error.errno == errno.ENOSPC:
             raise RunFolderError(f"the disk is full: could not write {path}; free some space and resume") from error

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -154,6 +155,7 @@ class SkillChain:
         first = self.start if state is None else state
         return self.rollouts(model, first[None], epsilon=epsilon, rng=rng, max_steps=max_steps).states
 
+    @checked
     def save(self, folder: str | Path) -> None:
         """Write chain.json (structure), chain.npz (activation sets and targets) and chain.safetensors (policies)."""
         arrays = {"start": self.start, "first_action": self.actions.first, "last_action": self.actions.last}
@@ -169,6 +171,7 @@ class SkillChain:
         }, arrays, [skill.policy for skill in self.skills])
 
     @classmethod
+    @checked
     def load(cls, folder: str | Path, *, trust: bool = False) -> "SkillChain":
         """Read a chain that `save` wrote.
 

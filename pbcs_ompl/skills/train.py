@@ -10,6 +10,7 @@ import gymnasium
 from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.bridge.trajectory import Trajectory
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import RunFolderError
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -23,6 +24,7 @@ from pbcs_ompl.skills.config import TrainConfig, read_config
 from pbcs_ompl.skills.training import Training, TrainResult, training_versions
 
 
+@checked
 def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: Trajectory | None = None,
           method: str = "pbcs", agent: str = "ddpg", preset: str = "fast", settings: dict[str, Any] | None = None,
           agent_settings: dict[str, Any] | None = None, planner: str | None = None,
@@ -79,6 +81,7 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         return Training(model, config, folder, on_progress, False).run(trajectory)
 
 
+@checked
 def resume(folder: str | Path, *, max_transitions: int | None = None, trust: bool = False,
            on_progress: ProgressCallback | None = None) -> TrainResult:
     """Continue an interrupted training; the result is that of an uninterrupted one, bit for bit.

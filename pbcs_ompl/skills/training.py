@@ -89,6 +89,10 @@ class TrainResult:
                 "updates": self.updates, "seconds": self.seconds, "seed": self.seed, "out": self.out}
 
 
+WARM_UP_ROWS = 256
+"""Transitions of a first update."""
+
+
 class Training:
     """A run: its configuration, its folder (if any), its clock.
 
@@ -116,7 +120,20 @@ class Training:
     def run(self, trajectory: Trajectory | None) -> TrainResult:
         """Plan (or take the plan that is given or was made before), train, evaluate and write."""
         with one_thread():
+            self._warm_up()
             return self._run(trajectory)
+
+    def _warm_up(self) -> None:
+        """Make an update of an agent that is thrown away: the reported seconds are not those of a compiler."""
+        agent = self.config.agent_factory(self.model)(0)
+        observations = np.zeros((1, WARM_UP_ROWS, self.model.observation_size))
+        actions = np.tile(self.model.action_low, (1, WARM_UP_ROWS, 1))
+        rewards, terminals = np.zeros((1, WARM_UP_ROWS)), np.zeros((1, WARM_UP_ROWS), dtype=np.bool_)
+        with code_of_others("the agent"):
+            agent.add_transitions(observations, actions, rewards, observations, terminals)
+            agent.train(1)
+        self.began = time.perf_counter()
+        self.next_checkpoint = self.began + FIRST_CHECKPOINT_SECONDS
 
     def _run(self, trajectory: Trajectory | None) -> TrainResult:
         if self.folder and not self.resumed:

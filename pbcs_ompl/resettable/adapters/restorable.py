@@ -11,6 +11,7 @@ from gymnasium.spaces import Box
 
 from pbcs_ompl.core.errors import CallbackFailed
 from pbcs_ompl.core.types import Array, Capability
+from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.feature_bounds import feature_bounds, narrow_words
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rules import (
@@ -107,6 +108,14 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         """Return the bounds [F] of the feature; None where they have to be explored."""
         return None
 
+    def named_state(self, env: Any) -> dict[str, Any]:
+        """Return the parts of the state of an environment like `inner`, by name, to compare them; empty if unknown."""
+        return {}
+
+    def is_success(self, outcome: Outcome) -> bool:
+        """Return whether an outcome is a success."""
+        return bool(self._is_success(outcome))
+
     def difference(self, states: Array, others: Array) -> Array:
         """Return the differences [B, K] between saved states [B, S] that `distance` measures, before features."""
         return np.empty((len(states), 0))
@@ -119,7 +128,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Make one step of the environment."""
-        observation, reward, terminated, truncated, info = self.inner.step(action)
+        observation, reward, terminated, truncated, info = self.inner.step(copied(action))
         success = self._store(Outcome(self.inner, observation, float(reward), bool(terminated), info))
         return flat(observation), float(reward), bool(terminated), bool(truncated), {**info, "is_success": success}
 
@@ -178,7 +187,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self._head = np.asarray(self._feature_of(outcome._replace(named=self.named)), dtype=np.float64).reshape(-1)
         if not len(self._head):
             raise CallbackFailed("the feature function returned no numbers")
-        success = bool(self._is_success(outcome))
+        success = self.is_success(outcome)
         seen = outcome._replace(observation=self.named)
         reported = None if self.goal_rule is not None else self.reported_goal_distance(seen)
         self._has_goal_distance = reported is not None
