@@ -14,8 +14,10 @@ from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap, copied
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
+from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.fresh import EnvMaker
 from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.observing import state_observer
 from pbcs_ompl.resettable.rules import Outcome, reported_success
 from pbcs_ompl.resettable.supported import task_env
 from pbcs_ompl.resettable.task_env import TaskEnv
@@ -152,9 +154,10 @@ class _Branching:
 
     def _observed(self, states: list[Array]) -> Iterator[str]:
         """Compare the observations of restored states."""
-        if not hasattr(self._env, "observe"):
+        observe = state_observer(self._env, EnvAttributes.of(self._env))
+        if observe is None:
             return
-        rows = self._env.observe(np.array(states))
+        rows = observe(np.array(states))
         for step, (row, moment) in enumerate(zip(rows, self._one[1], strict=False)):
             index = _first_index(moment.observation, flat(row))
             yield f"observation{index} of the restored state of step {step}" if index is not None else ""

@@ -22,6 +22,7 @@ from pbcs_ompl.resettable.memory.plain_values import (
     to_text,
     unpack,
 )
+from pbcs_ompl.resettable.task_env import bare
 
 LARGEST = 4096
 """Numbers that one attribute may add to a state."""
@@ -141,7 +142,7 @@ class _Variable:
 
     def __init__(self, env: Any, path: Path, seen: Seen):
         self.path = path
-        self._name = f"{type(env).__name__}: the attribute {text_of(path)!r}"
+        self._name = f"{type(bare(env)).__name__}: the attribute {text_of(path)!r}"
         self._kind = next(iter(seen.kinds)) if len(seen.kinds) == 1 else None
         self._in_place = seen.is_one_object and isinstance(seen.object, np.ndarray)
         if self._kind is None:

@@ -13,6 +13,7 @@ from pbcs_ompl.resettable.memory.code import names_of
 from pbcs_ompl.resettable.memory.exploration import Changes, episodes, refuse_random
 from pbcs_ompl.resettable.memory.owned import Path, find, look, put, text_of
 from pbcs_ompl.resettable.memory.plain_values import same
+from pbcs_ompl.resettable.task_env import bare
 
 STEPS = 20
 FAR = (1, 1_000_000, -1_000_000)
@@ -40,7 +41,7 @@ def refuse_uncovered(env: Any) -> None:
         name = next(step.key for step in reversed(path) if not step.is_item)
         is_read = name in names.loaded or not names.loaded
         if (seen.in_step or name in names.stored) and is_read and _matters(env, path):
-            raise NotResettable(f"{type(env).__name__} is not resettable: its steps change the attribute "
+            raise NotResettable(f"{type(bare(env)).__name__} is not resettable: its steps change the attribute "
                                 f"{text_of(path)!r} and read it, and set_env_state does not set it; make it part of "
                                 f"what get_env_state returns")
 
@@ -142,6 +143,7 @@ def _another(value: Any) -> Any:
 @contextmanager
 def _traced(env: Any, name: str) -> Iterator[list[str] | None]:
     """Note how an attribute of `env` is used; None where its class does not allow that."""
+    env = bare(env)
     kind, uses = type(env), list[str]()
 
     class Traced(kind):  # type: ignore[misc, valid-type]
