@@ -14,11 +14,7 @@ from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap, copied
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
-<<<<<<< HEAD
-=======
 from pbcs_ompl.resettable.attributes import EnvAttributes
-from pbcs_ompl.resettable.fresh import EnvMaker
->>>>>>> 20637f4f087d6b670f730459ae4202bade8688ff
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.observing import state_observer
 from pbcs_ompl.resettable.rules import Outcome, reported_success
@@ -155,12 +151,8 @@ class _Branching:
 
     def _observed(self, states: list[Array]) -> Iterator[str]:
         """Compare the observations of restored states."""
-<<<<<<< HEAD
-        if not isinstance(self._env, RestorableEnv | SuccessFlagEnv):
-=======
         observe = state_observer(self._env, EnvAttributes.of(self._env))
         if observe is None:
->>>>>>> 20637f4f087d6b670f730459ae4202bade8688ff
             return
         rows = observe(np.array(states))
         for step, (row, moment) in enumerate(zip(rows, self._one[1], strict=False)):
