@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from importlib.resources import files
+from math import inf
 from typing import Any, ClassVar, Self
 
 from pbcs_ompl.core.errors import InvalidOption, UnknownName
@@ -33,6 +34,10 @@ def _read_preset(name: str) -> dict[str, Any]:
     if name not in preset_names():
         raise UnknownName("preset", name, preset_names())
     return tomllib.loads(files("pbcs_ompl.agents").joinpath(f"{name}.toml").read_text("utf-8"))
+
+
+DEEPEST, WIDEST, LARGEST = 64, 16_384, 1_000_000_000
+"""Of the layers of a network, and of a mini-batch or replay buffer: what is larger fits no machine."""
 
 
 @dataclass(frozen=True)
@@ -69,12 +74,13 @@ class AgentSettings:
             object.__setattr__(self, "hidden", tuple(self.hidden))
         types = {field.name: type(field.default) for field in fields(self)}
         check_types({name: getattr(self, name) for name in types}, types)
-        widths = [isinstance(width, int) and width > 0 for width in self.hidden]
-        check_range("hidden", self.hidden, bool(widths) and all(widths), "positive whole numbers")
+        widths = [isinstance(width, int) and 0 < width <= WIDEST for width in self.hidden]
+        check_range("hidden", self.hidden, 0 < len(widths) <= DEEPEST and all(widths),
+                    f"at most {DEEPEST} whole numbers from 1 to {WIDEST}")
         for name in ("actor_learning_rate", "critic_learning_rate"):
-            check_range(name, getattr(self, name), getattr(self, name) > 0.0, "a positive number")
+            check_range(name, getattr(self, name), 0.0 < getattr(self, name) < inf, "a positive number")
         for name in ("batch_size", "replay_capacity"):
-            check_range(name, getattr(self, name), getattr(self, name) >= 1, "a positive number")
+            check_range(name, getattr(self, name), 1 <= getattr(self, name) <= LARGEST, f"from 1 to {LARGEST}")
         check_range("discount", self.discount, 0.0 <= self.discount < 1.0, "in [0, 1)")
         check_range("polyak", self.polyak, 0.0 <= self.polyak <= 1.0, "in [0, 1]")
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -57,6 +58,7 @@ class Trajectory:
         size = int(np.prod(self.actions.shape[1:]))
         return np.array(self.actions, dtype=np.float64).reshape(self.length, size)
 
+    @checked
     def save(self, path: str | Path) -> None:
         """Write one npz, atomically and without pickle; the words lie in it as a JSON string.
 
@@ -69,6 +71,7 @@ class Trajectory:
                      actions=self.actions, rewards=self.rewards)
 
     @classmethod
+    @checked
     def load(cls, path: str | Path, *, trust: bool = False) -> "Trajectory":
         """Read what `save` has written.
 

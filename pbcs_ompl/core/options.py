@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from pbcs_ompl.core.checked import short_repr
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
 from pbcs_ompl.core.types import Array
 
@@ -40,7 +41,7 @@ def check_range(name: str, value: Any, holds: bool, expected: str) -> None:
         InvalidOption: it is not allowed.
     """
     if not holds:
-        raise InvalidOption(f"{name} is {value!r}; expected {expected}")
+        raise InvalidOption(f"{name} is {short_repr(value)}; expected {expected}")
 
 
 def check_types(values: Mapping[str, Any], types: Mapping[str, type]) -> None:

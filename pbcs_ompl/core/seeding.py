@@ -4,6 +4,8 @@ import zlib
 
 import numpy as np
 
+from pbcs_ompl.core.options import check_range
+
 
 class SeedTree:
     """A seed from which named, independent streams are derived.
@@ -16,6 +18,7 @@ class SeedTree:
     """
 
     def __init__(self, seed: int, *path: int):
+        check_range("seed", seed, seed >= 0, "a whole number of at least 0")
         self._sequence = np.random.SeedSequence(entropy=seed, spawn_key=path)
         self.seed = seed
         self._path = path

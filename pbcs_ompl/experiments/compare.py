@@ -8,6 +8,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from pbcs_ompl.core.callbacks import code_of_others
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.types import ProgressCallback
@@ -18,7 +20,8 @@ from pbcs_ompl.experiments.records import REMEDY, make_missing_runs, read_record
 from pbcs_ompl.experiments.run import Failure, Record
 from pbcs_ompl.experiments.sweep import Environment, Options, Sweep, environment_specs, make_sweep
 from pbcs_ompl.experiments.workers import Executor, Limits, make_executor
-from pbcs_ompl.results.files import CONFIG, RESULT, write_json
+from pbcs_ompl.results.checksums import write_summed_json
+from pbcs_ompl.results.files import CONFIG, RESULT
 from pbcs_ompl.results.folder import open_run, read_config
 from pbcs_ompl.results.schema import CompareConfig, RunOfComparison, check
 
@@ -57,9 +60,11 @@ class Comparison:
         return {"rows": self.rows, "tests": self.tests, "database": self.database}
 
 
+@checked
 def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | Sequence[Environment], *,
             env_kwargs: Options | Sequence[Options] | None = None, goal: str | None = None,
-            feature: str | None = None, start_seed: int | None = None, seeds: int | Sequence[int] = 10,
+            feature: str | None = None, start_seed: int | None = None,
+            reset_options: Options | None = None, seeds: int | Sequence[int] = 10,
             max_transitions: int = 1_000_000, max_seconds: float | None = None, max_memory: float | None = None,
             jobs: int | Executor = 1, out: str | Path | None = None,
             on_progress: ProgressCallback | None = None) -> Comparison:
@@ -73,7 +78,7 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
         planners: Registered names or `module:attribute`, which other processes have to find; or their options by name.
         env: An environment or several: ids, `EnvSpec`s, and Gymnasium environments or models of a registered id.
         env_kwargs: Options of ids: as many as there are environments, or one of either for all of the other.
-        goal, feature, start_seed: Rules of all environments; see `pbcs_ompl.make`.
+        goal, feature, start_seed, reset_options: Rules of all environments; see `pbcs_ompl.make`.
         seeds: How many seeds (0, 1, ...), or the seeds.
         max_transitions: The most environment steps of one run.
         max_seconds: The most wall time of the search of one run; None for any. A planner that has not ended 20 seconds
@@ -92,7 +97,8 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
     """
     limits = Limits(None if max_seconds is None else max_seconds + SECONDS_OF_GRACE, max_memory)
     executor = make_executor(jobs)
-    environments = environment_specs(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
+    environments = environment_specs(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed,
+                                     reset_options=reset_options)
     sweep = make_sweep(planners, environments, seeds, max_transitions, max_seconds, max_memory)
     folder = None if out is None else Path(out)
     with nullcontext() if folder is None else open_run(folder, sweep.config(), may_change=("seeds",)):
@@ -104,7 +110,7 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
         comparison = _merge(sweep, made.records, folder)
         if folder is not None:
             write_database(folder / DATABASE, write_logs(folder, sweep, comparison.runs))
-            write_json(folder / RESULT, comparison.summary())
+            write_summed_json(folder / RESULT, comparison.summary())
     return comparison
 
 
@@ -180,8 +186,9 @@ class _Progress:
             self._ended[key] += record["seconds"] is not None
         if self._on_progress is not None:
             runs = sum(len(numbers) for numbers in self._transitions.values())
-            self._on_progress({"runs": runs, "solved": sum(self._solved.values()),
-                               "table": [*map(self._row, self._solved)]})
+            with code_of_others("on_progress"):
+                self._on_progress({"runs": runs, "solved": sum(self._solved.values()),
+                                   "table": [*map(self._row, self._solved)]})
 
     def add_one(self, found: Record | Failure) -> None:
         """Count the record of a run that has just ended; failed runs have one, too."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.options import check_range
 
 Record = dict[str, Any]
 """What a run found: plain values, as its file holds them."""
@@ -40,6 +41,19 @@ class Failure:
 
 RunFunction = Callable[[Run], Record]
 """Makes a run and returns its record. Other processes import it by its name."""
+
+
+MOST_SEEDS = 100_000
+
+
+def check_number_of_seeds(seeds: int) -> int:
+    """Return it.
+
+    Raises:
+        InvalidOption: fewer than one, or more than one machine could ever make.
+    """
+    check_range("seeds", seeds, 1 <= seeds <= MOST_SEEDS, f"from 1 to {MOST_SEEDS}")
+    return seeds
 
 
 @dataclass(frozen=True)

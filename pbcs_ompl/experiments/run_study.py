@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pbcs_ompl.core.callbacks import code_of_others
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.types import ProgressCallback
 from pbcs_ompl.experiments.claims import Claim
@@ -58,6 +60,7 @@ class StudyRun:
         return find_study(self.study).run(run.settings)
 
 
+@checked
 def run_study(study: Study | str | Path, *, out: str | Path, seeds: int | None = None, jobs: int | Executor = 1,
               max_seconds: float | None = None, max_memory: float | None = None,
               on_progress: ProgressCallback | None = None) -> StudyResult:
@@ -100,6 +103,7 @@ def run_study(study: Study | str | Path, *, out: str | Path, seeds: int | None =
     return result
 
 
+@checked
 def run_shard(study: Study | str | Path, shard: Shard, *, out: str | Path, seeds: int | None = None,
               jobs: int | Executor = 1, max_seconds: float | None = None, max_memory: float | None = None,
               on_progress: ProgressCallback | None = None) -> Results:
@@ -149,7 +153,8 @@ def _make(study: Study, runs: Sequence[Run], folder: Path, executor: Executor, l
 
     def report() -> None:
         if on_progress is not None:
-            on_progress({"runs": len(ended), "failed": ended.count(False)})
+            with code_of_others("on_progress"):
+                on_progress({"runs": len(ended), "failed": ended.count(False)})
 
     def count(found: Record | Failure) -> None:
         ended.append(not isinstance(found, Failure))

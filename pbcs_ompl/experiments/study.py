@@ -11,10 +11,9 @@ from types import ModuleType
 from typing import Any
 
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, PbcsError, UnknownName
-from pbcs_ompl.core.options import check_range
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.experiments.claims import Claim
-from pbcs_ompl.experiments.run import Record, Run
+from pbcs_ompl.experiments.run import Record, Run, check_number_of_seeds
 from pbcs_ompl.results.files import read_toml
 
 SWEEP, SCRIPT, ANALYSIS = "sweep.toml", "study.py", "analysis.py"
@@ -71,11 +70,9 @@ class Study:
         """Return how many seeds are run: `seeds`, or the default where it is None.
 
         Raises:
-            InvalidOption: fewer than one.
+            InvalidOption: fewer than one, or too many.
         """
-        chosen = self.seeds if seeds is None else seeds
-        check_range("seeds", chosen, chosen >= 1, "at least 1")
-        return chosen
+        return check_number_of_seeds(self.seeds if seeds is None else seeds)
 
     def on_device(self, device: str) -> "Study":
         """Return the same study with its agents on another device: "cpu" or "cuda".

@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 
 from pbcs_ompl.core.callbacks import describe
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, PbcsError, UnknownName
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -77,16 +78,19 @@ class _Roll:
         return ""
 
 
+@checked
 def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
                      env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
                      feature: str | FeatureRule | None = None, start_seed: int | None = None,
-                     seed: int = 0, on_check: Callable[[str], None] | None = None) -> ResetReport:
+                     reset_options: dict[str, Any] | None = None, seed: int = 0,
+                     on_check: Callable[[str], None] | None = None) -> ResetReport:
     """Check that an environment continues from a restored state as it did before, bit for bit.
 
     What is wrong with an environment is in the report; what is wrong with the arguments is raised.
 
     Args:
-        env, env_kwargs, goal, feature, start_seed: See `pbcs_ompl.make`. An environment that is given is moved about.
+        env, env_kwargs, goal, feature, start_seed, reset_options: See `pbcs_ompl.make`. An environment that is given is
+            moved about.
         seed: Seed of the actions and states that are tried.
         on_check: Gets the name of each check before it runs.
 
@@ -95,7 +99,7 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
     """
     name = env if isinstance(env, str) else type(env).__name__
     try:
-        model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
+        model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options)
     except (UnknownName, InvalidOption, MissingDependency):
         raise
     except Exception as error:  # an author's mistake is a finding, not a crash
@@ -163,7 +167,7 @@ class _Trial:
         return self.first.difference(self.roll(self.env, self.start))
 
     def disturbed(self) -> str:
-        self.env.reset(seed=12345)
+        self.env.reset(seed=12345, options=self.model.spec.reset_options)
         for action in self.actions.to_actions(self.controls[::-1]):
             _, _, terminated, truncated, _ = self.env.step(action)
             if terminated or truncated:

@@ -38,9 +38,13 @@ MOST_BYTES, MOST_ARRAY_BYTES, MOST_ARRAYS = 1 << 28, 1 << 33, 100_000
 
 @contextmanager
 def write_errors(path: Path) -> Iterator[None]:
-    """Turn an OSError while writing below `path` into a RunFolderError of one line."""
+    """Turn an OSError while writing below `path`, or a name that no file has, into a RunFolderError of one line."""
     try:
+        if b"\0" in os.fsencode(path):
+            raise RunFolderError(f"{str(path)!a} is no name of a file: it holds a null byte")
         yield
+    except UnicodeEncodeError as error:
+        raise RunFolderError(f"{str(path)!a} is no name of a file: {error.reason}") from error
     except OSError as error:
         if error.errno == errno.ENOSPC:
             raise RunFolderError(f"the disk is full: could not write {path}; free some space and resume") from error
@@ -86,7 +90,7 @@ def write_text(path: Path, text: str) -> None:
 
 def write_json(path: Path, value: Any) -> None:
     """Write JSON atomically; NumPy numbers and arrays become plain ones."""
-    write_text(path, json.dumps(value, indent=2, default=plain) + "\n")
+    write_text(path, to_json(value))
 
 
 def write_toml(path: Path, table: dict[str, Any]) -> None:
@@ -187,6 +191,11 @@ def _read(path: Path, load: Callable[[], Content]) -> Content:
         raise DamagedFile(f"{path} does not exist") from error
     except Exception as error:  # zipfile, zlib, ValueError, EOFError, OSError: all mean the same to the user
         raise DamagedFile(f"{path} is damaged: {error}") from error
+
+
+def to_json(value: Any) -> str:
+    """Return a value as JSON; NumPy values and paths become plain ones."""
+    return json.dumps(value, indent=2, default=plain) + "\n"
 
 
 def to_toml(table: dict[str, Any]) -> str:

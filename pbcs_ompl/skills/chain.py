@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -154,21 +155,22 @@ class SkillChain:
         first = self.start if state is None else state
         return self.rollouts(model, first[None], epsilon=epsilon, rng=rng, max_steps=max_steps).states
 
+    @checked
     def save(self, folder: str | Path) -> None:
         """Write chain.json (structure), chain.npz (activation sets and targets) and chain.safetensors (policies)."""
         arrays = {"start": self.start, "first_action": self.actions.first, "last_action": self.actions.last}
         for index, skill in enumerate(self.skills):
             arrays |= to_arrays(skill.activation, f"activation{index}") | to_arrays(skill.target, f"target{index}")
             arrays |= entry_to_arrays(skill.entry, f"entry{index}")
-        seed = {} if self.reset_seed is None else {"reset_seed": self.reset_seed}
-        write_chain(Path(folder), {
-            "environment": self.environment.to_dict(), "time_limit": self.time_limit, **seed,
+        structure = {
+            "environment": self.environment.to_dict(), "time_limit": self.time_limit, "reset_seed": self.reset_seed,
             "action_shape": list(self.actions.shape),
             "skills": [{"activation": kind_of(skill.activation), "target": kind_of(skill.target),
-                        "entry": entry_kinds(skill.entry)} for skill in self.skills],
-        }, arrays, [skill.policy for skill in self.skills])
+                        "entry": entry_kinds(skill.entry)} for skill in self.skills]}
+        write_chain(Path(folder), structure, arrays, [skill.policy for skill in self.skills])
 
     @classmethod
+    @checked
     def load(cls, folder: str | Path, *, trust: bool = False) -> "SkillChain":
         """Read a chain that `save` wrote.
 
@@ -188,8 +190,7 @@ class SkillChain:
                       entry_from_arrays(entry["entry"], arrays, f"entry{index}"))
                 for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
             actions = ActionMap(arrays["first_action"], arrays["last_action"], tuple(structure["action_shape"]))
-            environment = EnvSpec.from_dict(structure["environment"], trusted=trust)
-            return cls(skills, arrays["start"], environment, structure["time_limit"], actions,
-                       structure.get("reset_seed"))
+            return cls(skills, arrays["start"], EnvSpec.from_dict(structure["environment"], trusted=trust),
+                       structure["time_limit"], actions, structure["reset_seed"])
         except (KeyError, ValueError, TypeError, IndexError) as error:
             raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, NotVerified
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -21,6 +22,7 @@ from pbcs_ompl.skills.chain import SkillChain
 
 EPISODE_STEPS = 1000
 """Length of an episode where neither the controller nor the environment has a limit."""
+MOST_EPISODES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,7 @@ class Evaluation:
                 "steps_median": self.steps_median, "epsilon": self.epsilon, "endings": self.endings}
 
 
+@checked
 def evaluate(controller: SkillChain | Controller,
              env: str | EnvSpec | gymnasium.Env[Any, Any] | ResettableModel | None = None, *,
              env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
@@ -92,7 +95,7 @@ def evaluate(controller: SkillChain | Controller,
         UnknownName, UnsupportedSpace: the environment does not exist, or does not fit.
         CallbackFailed: the environment raised.
     """
-    check_range("episodes", episodes, episodes >= 1, "at least 1")
+    check_range("episodes", episodes, 1 <= episodes <= MOST_EPISODES, f"from 1 to {MOST_EPISODES}")
     check_range("epsilon", epsilon, 0 <= epsilon <= 1, "within [0, 1]")
     rules: dict[str, Any] = {"goal": goal, "feature": feature, "start_seed": start_seed,
                              "reset_options": reset_options, "max_episode_steps": max_episode_steps}
@@ -138,3 +141,4 @@ def evaluate_chain(chain: SkillChain, task: Task, *, episodes: int, epsilon: flo
     executions = judge.drive(chain.controller(), reset_seeds=[chain.reset_seed] * episodes, max_steps=chain.time_limit,
                              epsilon=epsilon, seed=seed)
     return Evaluation.of(executions, epsilon)
+MOST_EPISODES = 1_000_000

@@ -10,6 +10,7 @@ import gymnasium
 from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.bridge.trajectory import Trajectory
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import RunFolderError
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -17,12 +18,14 @@ from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.results.checksums import changed_files
 from pbcs_ompl.results.files import CHECKPOINT, CONFIG, RESULT, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.config import TrainConfig, read_config
 from pbcs_ompl.skills.training import Training, TrainResult, training_versions
 
 
+@checked
 def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: Trajectory | None = None,
           method: str = "pbcs", agent: str = "ddpg", preset: str = "fast", settings: dict[str, Any] | None = None,
           agent_settings: dict[str, Any] | None = None, planner: str | None = None,
@@ -79,6 +82,7 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         return Training(model, config, folder, on_progress, False).run(trajectory)
 
 
+@checked
 def resume(folder: str | Path, *, max_transitions: int | None = None, trust: bool = False,
            on_progress: ProgressCallback | None = None) -> TrainResult:
     """Continue an interrupted training; the result is that of an uninterrupted one, bit for bit.
@@ -103,6 +107,9 @@ def resume(folder: str | Path, *, max_transitions: int | None = None, trust: boo
             raise RunFolderError(f"the training in {opened.path} has ended; there is nothing to resume")
         environment, config, versions = read_config(opened.path / CONFIG, trust=trust)
         _warn_of_other_versions(opened.path, versions)
+        for file in changed_files(opened.path):
+            warnings.warn(f"{file} was changed after it was written; the training goes by what it says now",
+                          stacklevel=2)
         if max_transitions is not None:
             config = replace(config, max_transitions=max_transitions)
             opened.write_config(read_toml(opened.path / CONFIG) | {"max_transitions": max_transitions})

@@ -11,6 +11,8 @@ from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
 from pbcs_ompl.experiments.workers.start import check_script
 from pbcs_ompl.experiments.workers.worker import Limits, Worker
 
+MOST_JOBS = 1024
+
 
 class Executor(Protocol):
     """What executes runs: processes of this machine, or a cluster (see `ray_cluster`)."""
@@ -40,8 +42,9 @@ def make_executor(jobs: int | Executor) -> Executor:
         CannotStart: they could not import the running script.
     """
     if not isinstance(jobs, int):
+        check_range("jobs", jobs, callable(jobs), "an integer, or what executes runs, such as ray_cluster(...)")
         return jobs
-    check_range("jobs", jobs, jobs >= 1, "at least 1")
+    check_range("jobs", jobs, not isinstance(jobs, bool) and 1 <= jobs <= MOST_JOBS, f"from 1 to {MOST_JOBS}")
     check_script()
     return partial(run_in_processes, jobs)
 

@@ -24,6 +24,8 @@ SECONDS_BETWEEN_POLLS = 0.1
 """How often the memory of a worker is measured; the system does not report when it grows."""
 IDLE_MEMORY_FRACTION = 0.5
 """A worker that holds more than this share of its limit between two runs is replaced: each run has the rest of it."""
+LONGEST_WAIT = 86_400.0
+"""Seconds; the system knows no timeout as long as a limit may be."""
 SHUTDOWN_TIMEOUT = 5.0
 """Seconds within which an idle process has to end by itself."""
 READY = "ready"
@@ -120,7 +122,7 @@ class Worker:
         left = max(0.0, self._deadline - time.monotonic())
         if self._limits.max_memory is not None:
             left = min(left, SECONDS_BETWEEN_POLLS)
-        return None if math.isinf(left) else left
+        return None if math.isinf(left) else min(left, LONGEST_WAIT)
 
     def make(self, run: Run) -> Record | Failure:
         """Make one run and wait for its end."""

@@ -45,6 +45,8 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
 
     capabilities: frozenset[Capability] = frozenset({"visited", "exact"})
     perturb_by_rollouts = True
+    exploring = False
+    """Whether steps are made only to see what range the feature has."""
     goal_radius = 1.0
     """A state is a success if its distance to the goal is smaller, where the environment reports one."""
 
@@ -65,7 +67,9 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.goal_threshold = self.goal_radius if self._has_goal_distance else 0.5
         saved = len(self.save())
         self.feature_dims = tuple(range(len(self._head)))
+        self.exploring = True
         self.bounds = feature_bounds(self)
+        self.exploring = False
         if self.bounds.narrow:
             warnings.warn(narrow_words(self.bounds), stacklevel=2)
         rest = np.full(saved + 1, UNBOUNDED)

@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.errors import DamagedFile, PbcsError, RunFolderError
 from pbcs_ompl.core.formatting import format_number, format_value
 from pbcs_ompl.core.utf8 import utf8
-from pbcs_ompl.results.files import write_atomically
+from pbcs_ompl.results.files import write_atomically, write_errors
 from pbcs_ompl.results.folder import find_folders
 from pbcs_ompl.results.report.section import DAMAGED, Section, damaged_section, make_section
 
@@ -40,6 +41,7 @@ class Report(NamedTuple):
         return {"out": str(self.page), "folders": folders, "damaged": damaged}
 
 
+@checked
 def write_report(folder: str | Path, out: str | Path | None = None) -> Report:
     """Write what a result folder holds, or all result folders below one, as one HTML page.
 
@@ -56,7 +58,8 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Report:
     root = Path(folder)
     paths = find_folders(root)
     page, single = root / REPORT if out is None else Path(out), paths == [root]
-    _check_replaceable(page)
+    with write_errors(page):
+        _check_replaceable(page)
     templates = _templates()
     shown = [_shown(path, root, number, templates, single) for number, path in enumerate(paths, start=1)]
     sections = [section for section, _ in shown]
