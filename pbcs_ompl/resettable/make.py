@@ -73,9 +73,10 @@ def _make(spec: EnvSpec, goal: str | GoalRule | None, feature: str | FeatureRule
     prefer_headless_rendering()
     spec = replace(spec, goal=goal if isinstance(goal, str) else None,
                    feature=feature if isinstance(feature, str) else None)
+    make_env = partial(fresh_env, spec)
     with code_of_others(f"the environment {spec.id!r}"):
         model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature, reset_options=spec.reset_options,
-                                   make_env=partial(fresh_env, spec))
+                                   make_env=make_env)
     model.spec = replace(model.spec, id=spec.id, start_seed=spec.start_seed, reset_options=spec.reset_options,
                          max_episode_steps=spec.max_episode_steps)  # the id with its module, if it names one
     return model

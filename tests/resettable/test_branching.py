@@ -1,4 +1,4 @@
-"""Restored states continue as fresh instances do; an instance with a past is told from a random one."""
+"""Restored states continue as fresh instances do; an instance with a past is not called random."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import NotResettable, UnsupportedSpace
 from pbcs_ompl.resettable import adapt, check_resettable
 from pbcs_ompl.resettable.adapters.visited import CopiedEnv, FreshEnv
-from pbcs_ompl.resettable.branching import first_difference, fresh_difference
+from pbcs_ompl.resettable.branching import first_difference
 from tests.resettable.toys import Line
 
 
@@ -49,7 +49,6 @@ class ScalesState(Scales):
 
 
 def test_an_instance_with_a_past_is_restored_in_fresh_ones() -> None:
-    assert fresh_difference(Line(), Worn) == "" or True
     with pytest.warns(UserWarning, match="does not do the same after a reset.*fresh instance.*slow"):
         model: Any = adapt(Worn())
     assert isinstance(model.env, FreshEnv)
@@ -156,5 +155,5 @@ def test_pixels_are_refused_at_once() -> None:
         def reset(self, **_: Any) -> Any:
             raise AssertionError("nothing runs")
 
-    with pytest.raises(UnsupportedSpace, match=r"pixels.*numbers of its state"):
+    with pytest.raises(UnsupportedSpace, match="vectors of numbers, such as the state"):
         adapt(Pixels())

@@ -32,6 +32,10 @@ class AttributeEnv(RestorableEnv):
         self._memory = Memory(inner, changes, before, besides=("state",))
         super().__init__(inner, goal, feature)
 
+    def attach(self) -> None:
+        """Let the memory refer to `inner`."""
+        self._memory = self._memory.of(self.inner)
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         """Reset the environment as if nothing had run in it before."""
         self._memory.clear()

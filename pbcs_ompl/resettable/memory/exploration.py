@@ -60,8 +60,8 @@ class Changes:
     """What of an environment has changed, by path; `add` after every reset and step."""
 
     def __init__(self, env: Any):
-        self._env = env
-        self.owned: Owned = look(env)
+        self._env = bare(env)
+        self.owned: Owned = look(self._env)
         self._generators = states(self.owned.generators)
         self.plain = {path: Seen(value) for path, value in self.owned.plain.items()}
         self._opaque = {path: (value, fingerprint(value)) for path, value in self.owned.opaque.items()}
@@ -104,7 +104,7 @@ def _first_names(plain: dict[Path, Any]) -> dict[Path, Path]:
 
 def plain_copies(env: Any) -> dict[Path, Any]:
     """Return copies of the plain values that an environment owns, by path."""
-    return {path: deepcopy(value) for path, value in look(env).plain.items()}
+    return {path: deepcopy(value) for path, value in look(bare(env)).plain.items()}
 
 
 def episodes(env: gymnasium.Env[Any, Any], seeds: tuple[int, ...] = SEEDS, steps: int = STEPS) -> Iterator[Event]:
@@ -153,7 +153,7 @@ def refuse_opaque(env: Any, path: Path, value: Any) -> None:
 def fingerprint(value: Any) -> Any:
     """Return what changes if an opaque value does; None where that cannot be seen, and it can only change."""
     if isinstance(value, io.IOBase):
-        return value.tell() if not value.closed and value.readable() and value.seekable() else id(value)
+        return value.seek(0, io.SEEK_CUR) if not value.closed and value.readable() and value.seekable() else id(value)
     if hasattr(value, "qpos") and hasattr(value, "time"):  # a simulation of MuJoCo
         return value.time, value.qpos.tobytes()
     return None if hasattr(value, "__next__") else id(value)

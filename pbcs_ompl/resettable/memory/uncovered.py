@@ -35,7 +35,7 @@ def refuse_uncovered(env: Any) -> None:
     changes = Changes(env)
     for event in episodes(env):
         changes.add(event)
-    refuse_random(env, changes)
+    refuse_random(bare(env), changes)
     names = names_of({type(owner) for owner in changes.owned.owners.values()}, ("step",))
     for path, seen in changes.plain.items():
         name = next(step.key for step in reversed(path) if not step.is_item)
@@ -59,7 +59,7 @@ def _is_set(env: Any, path: Path) -> bool:
     env.set_env_state(state.copy())
     expected = _plain(env, path)
     if type(expected) in (bool, int, float) or isinstance(expected, np.ndarray | np.generic):
-        put(env, path, _another(expected))
+        put(bare(env), path, _another(expected))
     else:
         for action in _actions(env)[:STEPS // 2]:
             if any(env.step(copied(action))[2:4]):
@@ -78,7 +78,7 @@ def _is_read_first(env: Any, path: Path) -> bool:
     read_first = False
     env.reset(seed=0)
     for action in _actions(env):
-        with _traced(env, attribute.key) as uses:
+        with _traced(bare(env), attribute.key) as uses:
             _, _, terminated, truncated, _ = env.step(copied(action))
         if uses is None or (uses and uses[0] == "read"):
             read_first = True
@@ -91,7 +91,7 @@ def _only_counts(env: Any, path: Path) -> bool:
     """Return whether a number has no influence on anything but itself, however far off it is."""
     state = _middle(env)
     env.set_env_state(state.copy())
-    value = find(env, path)
+    value = find(bare(env), path)
     if type(value) not in (int, float) and not isinstance(value, np.integer | np.floating):
         return False
     expected = _reported(env, state, path, value)
@@ -101,7 +101,7 @@ def _only_counts(env: Any, path: Path) -> bool:
 def _reported(env: Any, state: Array, path: Path, value: Any) -> list[tuple[Any, ...]]:
     """Return what steps report from a state, with a value at a path."""
     env.set_env_state(state.copy())
-    put(env, path, value)
+    put(bare(env), path, value)
     reports = []
     for action in _actions(env):
         observation, reward, terminated, truncated, info = env.step(copied(action))
@@ -110,7 +110,7 @@ def _reported(env: Any, state: Array, path: Path, value: Any) -> list[tuple[Any,
                         np.array(env.get_env_state(), dtype=np.float64).tobytes()))
         if terminated or truncated:
             break
-    put(env, path, value)
+    put(bare(env), path, value)
     return reports
 
 
@@ -131,7 +131,7 @@ def _actions(env: Any) -> list[Any]:
 
 
 def _plain(env: Any, path: Path) -> Any:
-    return look(env).plain[path]
+    return look(bare(env)).plain[path]
 
 
 def _another(value: Any) -> Any:
