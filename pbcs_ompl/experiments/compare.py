@@ -20,7 +20,8 @@ from pbcs_ompl.experiments.records import REMEDY, make_missing_runs, read_record
 from pbcs_ompl.experiments.run import Failure, Record
 from pbcs_ompl.experiments.sweep import Environment, Options, Sweep, environment_specs, make_sweep
 from pbcs_ompl.experiments.workers import Executor, Limits, make_executor
-from pbcs_ompl.results.files import CONFIG, RESULT, write_json
+from pbcs_ompl.results.checksums import write_summed_json
+from pbcs_ompl.results.files import CONFIG, RESULT
 from pbcs_ompl.results.folder import open_run, read_config
 from pbcs_ompl.results.schema import CompareConfig, RunOfComparison, check
 
@@ -109,7 +110,7 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
         comparison = _merge(sweep, made.records, folder)
         if folder is not None:
             write_database(folder / DATABASE, write_logs(folder, sweep, comparison.runs))
-            write_json(folder / RESULT, comparison.summary())
+            write_summed_json(folder / RESULT, comparison.summary())
     return comparison
 
 

@@ -20,14 +20,15 @@ from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.signals import interruptible
 from pbcs_ompl.core.types import Array, Counter, ProgressCallback
 from pbcs_ompl.resettable.task import Task
-from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, read_json, read_toml, write_json
+from pbcs_ompl.results.checksums import write_summed_json
+from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.results.provenance import planning_versions
 from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.config import METHODS, TrainConfig
 from pbcs_ompl.skills.evaluation import Evaluation, evaluate_chain
-from pbcs_ompl.skills.method import TrainingMethod, read_checkpoint, write_checkpoint
+from pbcs_ompl.skills.method import TrainingMethod, restore, write_checkpoint
 from pbcs_ompl.skills.settings import CriterionSettings, PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
@@ -152,7 +153,7 @@ class Training:
 
     def _plan(self, trajectory: Trajectory | None) -> tuple[Trajectory | None, int, str | None]:
         """Return the plan, the transitions it took, and why there is none to train along."""
-        if self.path and self.resumed and (self.path / PLAN).is_file():
+        if self.path and self.resumed and is_there(self.path / PLAN):
             trajectory = Trajectory.load(self.path / TRAJECTORY)
             self._check_replays(trajectory)
             return trajectory, read_json(self.path / PLAN, PlanEffort)["transitions"], None
@@ -181,7 +182,7 @@ class Training:
     def _keep_plan(self, trajectory: Trajectory, transitions: int) -> None:
         if self.path:
             trajectory.save(self.path / TRAJECTORY)
-            write_json(self.path / PLAN, {"transitions": transitions})
+            write_summed_json(self.path / PLAN, {"transitions": transitions})
 
     def _check_replays(self, trajectory: Trajectory) -> None:
         """Refuse a trajectory that is not true here; the replay also visits its states, where only those are restored.
@@ -208,10 +209,8 @@ class Training:
         trainer = SkillTrainer(self.config.agent_factory(self.model), self._waypoints(trajectory),
                                self.settings.episodes, counter, self.seeds.child("skills").generator())
         method = METHODS[self.config.method].build(trainer, self.settings)
-        if self.path and self.resumed and (self.path / CHECKPOINT).is_file():
-            snapshot, seconds = read_checkpoint(self.path / CHECKPOINT)
-            method.restore(snapshot)
-            self.began -= seconds
+        if self.path and self.resumed and is_there(self.path / CHECKPOINT):
+            self.began -= restore(method, self.path / CHECKPOINT)
         return method
 
     def _waypoints(self, trajectory: Trajectory | None) -> Waypoints:
