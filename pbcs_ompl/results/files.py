@@ -90,7 +90,7 @@ def write_text(path: Path, text: str) -> None:
 
 def write_json(path: Path, value: Any) -> None:
     """Write JSON atomically; NumPy numbers and arrays become plain ones."""
-    write_text(path, json.dumps(value, indent=2, default=plain) + "\n")
+    write_text(path, json.dumps(value, indent=2, default=plain, ensure_ascii=False) + "\n")
 
 
 def write_toml(path: Path, table: dict[str, Any]) -> None:
