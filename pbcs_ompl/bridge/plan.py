@@ -20,7 +20,7 @@ from pbcs_ompl.bridge.verification import Verification, verify
 from pbcs_ompl.core.callbacks import code_of_others
 from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.core.errors import DamagedFile, PbcsError
 from pbcs_ompl.core.interfaces import BatchPlanner, ResettableModel
 from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.seeding import SeedTree
@@ -28,7 +28,9 @@ from pbcs_ompl.core.signals import interruptible
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.results.checksums import SUMS
 from pbcs_ompl.results.files import CONFIG, PROVENANCE, RESULT, TRAJECTORY, TREE, write_errors
 from pbcs_ompl.results.folder import RunFolder, read_folder, start_run
 from pbcs_ompl.results.provenance import planning_versions
@@ -45,7 +47,7 @@ class PlanResult:
         transitions: Environment steps that were made.
         collision_checks: How often the environment was asked whether something collides: by every transition, and
             by every state that OMPL made up itself.
-        seconds: Wall time of the search alone.
+        seconds: Wall time of the search alone, without compilation.
         nodes: Size of the tree.
         path_length: Steps of the trajectory; None when none was found.
         replay_ok: Whether the trajectory gave the same states bit for bit in that environment; None when none was
@@ -124,6 +126,7 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
     config = {"kind": "plan", "planner": spec.name, "seed": seed, **limits._asdict(),
               "environment": model.spec.to_dict(), "planner_kwargs": spec.options, "versions": planning_versions()}
     with _new_folder(out, config) as folder:
+        _warm_up(model, spec, planner)
         recorder = TransitionRecorder(model) if coverage else None
         with quiet_ompl(), make_problem(model, seed=seed, counter=Counter(limits.max_transitions),
                                         recorder=recorder) as problem:
@@ -161,6 +164,30 @@ def read_plan(folder: str | Path) -> PlanResult:
 
 PARTS = (TRAJECTORY, TREE)
 NOTHING_FOUND = Verification(False, None, "the budget ended before the goal was reached")
+
+
+WARM_UP = Limits(64, 1.0)
+TOY = "pbcs/Toy1D-v0"
+_warm: set[tuple[str, str]] = set()
+"""The planners and environments whose code this process has compiled."""
+
+
+def _warm_up(model: ResettableModel, spec: PlannerSpec, planner: Any) -> None:
+    """Search for a moment, so that the reported seconds are those of the search and not of a compiler.
+
+    The search is one in the model where its steps are functions of batches, which may be compiled and leave nothing
+    behind; else one in a toy, because an environment that is stepped makes no steps beyond its budget.
+    """
+    pure = isinstance(model, VectorisedModel)
+    key = (spec.name, model.spec.label if pure else TOY)
+    if key in _warm:
+        return
+    _warm.add(key)
+    with suppress(PbcsError):  # what is wrong is raised by the search itself
+        toy = model if pure else make(TOY)
+        small = spec if pure else PlannerSpec(planner, {})
+        with quiet_ompl(), make_problem(toy, counter=Counter(WARM_UP.max_transitions)) as problem:
+            _search(problem, small, 0, WARM_UP, None)
 
 
 class _Found(NamedTuple):
@@ -229,7 +256,7 @@ def _new_folder(out: str | Path | None, config: dict[str, Any]) -> Iterator[RunF
             yield folder
             return
         except BaseException:
-            for name in (*PARTS, CONFIG, PROVENANCE, RESULT):
+            for name in (*PARTS, CONFIG, PROVENANCE, RESULT, SUMS):
                 (folder.path / name).unlink(missing_ok=True)
             folder.close()
             if not existed:

@@ -103,7 +103,8 @@ def parse(parser: Parser, words: Sequence[str]) -> argparse.Namespace:
 
 def environment(arguments: argparse.Namespace) -> EnvSpec:
     """Return the environment that the options name."""
-    return EnvSpec(arguments.env, arguments.env_kwargs, arguments.goal, arguments.feature, arguments.start_seed)
+    return EnvSpec(arguments.env, arguments.env_kwargs, arguments.goal, arguments.feature, arguments.start_seed,
+                   arguments.reset_options)
 
 
 def _check_options(words: Sequence[str], parser: Parser) -> None:
@@ -117,6 +118,11 @@ def _check_options(words: Sequence[str], parser: Parser) -> None:
 def _doctor(verb: Parser) -> None:
     """show versions, known bad pairs, plug-ins found, and whether an environment is resettable"""
     _add_environment(verb, required=False)
+    verb.add_argument("--all", action="store_true",
+                      help="check every environment that is registered here, and write a page; again to continue")
+    verb.add_argument("--max-seconds", type=seconds, default=60.0, metavar="S",
+                      help="of --all: how long one environment may take (60)")
+    verb.add_argument("--out", metavar="DIR", help="of --all: folder of environments.md and .json (runs/doctor)")
 
 
 def _plan(verb: Parser) -> None:
@@ -221,10 +227,12 @@ def _add_environment(verb: Parser, *, required: bool = True, several: bool = Fal
     verb.add_argument("--env", required=required, metavar="ID", help="a Gymnasium id, such as pbcs/Maze-v0", **number)
     verb.add_argument("--env-kwargs", type=json_object, default=[{}] if several else {}, metavar="JSON",
                       help="options of the environment, such as '{\"size\": 5}'" + more, **number)
-    verb.add_argument("--goal", metavar="RULE", help="what a success is, such as 'reward>0' or 'qpos[0]>=0.45', in "
-                                                     "place of what the environment reports")
+    verb.add_argument("--goal", metavar="RULE", help="what a success is, such as 'reward>0' or 'obs[0]>1 and "
+                                                     "|obs[1]|<0.1', in place of what the environment reports")
     verb.add_argument("--start-seed", type=integer(0), metavar="N",
                       help="begin every episode as reset(seed=N) does, for environments that draw start and goal")
+    verb.add_argument("--reset-options", type=json_object, metavar="JSON",
+                      help="what every reset gets as options, such as '{\"start\": [0, 1]}'")
     verb.add_argument("--feature", metavar="RULE", help="what is explored, such as 'qpos[0:2]' or 'obs[0],obs[3]'")
 
 

@@ -26,7 +26,8 @@ def run(arguments: Namespace) -> int:
     try:
         with executor(arguments) as jobs, ProgressDisplay("compare", count="runs", budget=budget) as display:
             comparison = compare(planners, arguments.env, env_kwargs=arguments.env_kwargs, goal=arguments.goal,
-                                 feature=arguments.feature, start_seed=arguments.start_seed, seeds=arguments.seeds,
+                                 feature=arguments.feature, start_seed=arguments.start_seed,
+                                 reset_options=arguments.reset_options, seeds=arguments.seeds,
                                  max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds,
                                  max_memory=arguments.max_memory, jobs=jobs, out=out, on_progress=display)
     except KeyboardInterrupt as error:
@@ -84,5 +85,5 @@ def _pair(test: dict[str, Any]) -> str:
     if losses > wins:
         first, second, wins, losses = second, first, losses, wins
     ties = f" and {test['ties']} ties" if test["ties"] else ""
-    chance = f"p = {test['p_holm']:.2g} (sign test)"
+    chance = f"p (Holm) = {test['p_holm']:.2g}, sign test"
     return f"{first} needs less than {second} in {wins} seeds, more in {losses}{ties}: {chance}"

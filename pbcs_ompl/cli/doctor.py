@@ -2,9 +2,11 @@
 
 import os
 import shutil
+import sys
 from argparse import Namespace
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from platform import platform, python_version
 from typing import Any
 
@@ -12,15 +14,20 @@ from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.cli.arguments import environment
 from pbcs_ompl.cli.models import describe
 from pbcs_ompl.cli.terminal import print_summary
-from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.errors import InvalidOption, PbcsError
 from pbcs_ompl.core.registry import load_environments, names
+from pbcs_ompl.results.command_line import command
+from pbcs_ompl.results.files import write_text
 
+SURVEY = "runs/doctor"
 NEEDED = ("pbcs-ompl", "ompl", "gymnasium", "numpy", "scipy", "numba", "python-fcl", "matplotlib", "rich")
 OPTIONAL = ("torch", "safetensors", "mujoco", "gymnasium-robotics", "imageio", "stable-baselines3")
 
 
 def run(arguments: Namespace) -> int:
     """Look, change nothing. Returns 3 when a needed library is missing, 1 when the environment fails."""
+    if arguments.all:
+        return _run_survey(arguments)
     versions = {"python": python_version(), **{name: _version(name) for name in NEEDED + OPTIONAL}}
     missing = [name for name in NEEDED if versions[name] is None]
     result: dict[str, Any] = {
@@ -33,6 +40,28 @@ def run(arguments: Namespace) -> int:
     if missing:
         return 3
     return 1 if result["environment"] and not result["environment"]["ok"] else 0
+
+
+def _run_survey(arguments: Namespace) -> int:
+    """Check all environments, and write the page."""
+    from pbcs_ompl.resettable.survey import VERDICTS, Record, registered, survey
+    from pbcs_ompl.resettable.survey_page import survey_page
+
+    if arguments.env is not None:
+        raise InvalidOption("--all checks every environment; leave out --env")
+    out = Path(arguments.out or SURVEY)
+    ids = registered()
+
+    def show(record: Record, done: int) -> None:
+        print(f"{done}/{len(ids)} {record['id']}: {record['verdict']} {record['why']}".rstrip(), file=sys.stderr)
+
+    records = survey(ids, out / "environments.json", seconds=arguments.max_seconds, on_record=show)
+    page = out / "environments.md"
+    write_text(page, survey_page(records, command(["doctor", "--all"]), arguments.max_seconds))
+    counts = {verdict: sum(record["verdict"] == verdict for record in records) for verdict in VERDICTS}
+    lines = [("", f"{count} {verdict}") for verdict, count in counts.items()]
+    print_summary({"verdicts": counts, "page": str(page)}, [*lines, ("page", str(page))], as_json=arguments.json)
+    return 0
 
 
 def bad_pairs(versions: dict[str, str | None]) -> list[str]:

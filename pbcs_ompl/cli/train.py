@@ -27,7 +27,7 @@ def run(arguments: Namespace) -> int:
         _refuse_other_options(arguments)
         out = Path(arguments.resume)
         if lacks_picture_only(out):
-            return _draw_only(out, as_json=arguments.json)
+            return _draw_only(out, trust=arguments.trust, as_json=arguments.json)
     else:
         if arguments.env is None:
             raise InvalidOption("--env is missing (see pbcs train --help)")
@@ -72,11 +72,11 @@ def _read_trajectory(path: Path) -> Trajectory:
     return Trajectory.load(path / TRAJECTORY if path.is_dir() else path)
 
 
-def _draw_only(out: Path, *, as_json: bool) -> int:
+def _draw_only(out: Path, *, trust: bool, as_json: bool) -> int:
     """Make the picture of a training that was killed after its result."""
     with RunFolder(out, resume=True):
         result = read_folder(out).result or {}
-        chain = SkillChain.load(out / CHAIN) if (out / CHAIN).is_dir() else None
+        chain = SkillChain.load(out / CHAIN, trust=trust) if (out / CHAIN).is_dir() else None
         trajectory = Trajectory.load(out / TRAJECTORY) if (out / TRAJECTORY).exists() else None
         _draw(result, chain, trajectory, out)
     print_summary(result, [("solved" if result["solved"] else "not solved", "ended before; its picture is made now"),

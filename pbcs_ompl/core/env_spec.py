@@ -9,7 +9,7 @@ import msgspec
 
 from pbcs_ompl.core.checked import check_fields
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption
-from pbcs_ompl.core.plain import plain
+from pbcs_ompl.core.plain import from_nulls, plain, to_nulls
 from pbcs_ompl.core.trust import is_module_name, module_names, refuse_modules
 
 
@@ -63,18 +63,18 @@ class EnvSpec:
 
     @property
     def label(self) -> str:
-        """Its name in tables, as pbcs/Maze-v0(size=7); without spaces, because OMPL's benchmark log allows none."""
+        """Its name in tables, as pbcs/Maze-v0(size=7); different options have different names."""
         rules = {name: value for name, value in self.to_dict().items() if name not in ("id", "kwargs")}
         options = ",".join(f"{name}={_compact(value)}" for name, value in {**self.kwargs, **rules}.items())
-        return "".join((f"{self.id}({options})" if options else self.id).split())
+        return f"{self.id}({options})" if options else self.id
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values, as files hold them; rules that are None are left out."""
+        """Return plain values, as files hold them; rules that are None are left out, None in options is `NULL`."""
         rules = {"goal": self.goal, "feature": self.feature, "start_seed": self.start_seed,
-                 "reset_options": json.loads(json.dumps(self.reset_options, default=plain)),
+                 "reset_options": None if self.reset_options is None else _for_files(self.reset_options),
                  "max_episode_steps": self.max_episode_steps}
-        kwargs = json.loads(json.dumps(self.kwargs, default=plain))
-        return {"id": self.id, "kwargs": kwargs, **{name: rule for name, rule in rules.items() if rule is not None}}
+        given = {name: rule for name, rule in rules.items() if rule is not None}
+        return {"id": self.id, "kwargs": _for_files(self.kwargs), **given}
 
     @property
     def modules(self) -> list[str]:
@@ -112,7 +112,7 @@ class EnvSpec:
         """
         try:
             msgspec.convert(values, EnvValues)
-            return cls(**values, trusted=trusted)
+            return cls(**{name: from_nulls(value) for name, value in values.items()}, trusted=trusted)
         except (TypeError, InvalidOption, msgspec.ValidationError) as error:
             raise DamagedFile(f"the environment {values!r} is damaged: {error}") from error
 
@@ -129,5 +129,20 @@ def _check_integer(name: str, value: Any, least: int) -> None:
         raise InvalidOption(f"{name} is {value!r}; expected an integer >= {least}")
 
 
+def _for_files(options: dict[str, Any]) -> Any:
+    return to_nulls(json.loads(json.dumps(options, default=plain)))
+
+
 def _compact(value: Any) -> str:
-    return json.dumps(value, default=plain, separators=(",", ":")).strip('"')
+    """Return an option's value in a name: JSON, but that a string which cannot be mistaken for more goes unquoted."""
+    text = json.dumps(value, default=plain, separators=(",", ":"))
+    plainly = isinstance(value, str) and value == value.strip() and text == f'"{value}"' and "," not in value
+    return str(value) if plainly and not _is_json(value) else text
+
+
+def _is_json(text: str) -> bool:
+    try:
+        json.loads(text)
+    except ValueError:
+        return False
+    return True

@@ -21,3 +21,25 @@ def plain(value: Any) -> Any:
     if isinstance(value, frozenset | set):
         return sorted(value)
     raise TypeError(f"cannot write {type(value).__name__} as JSON")
+
+
+NULL = {"__null__": True}
+"""What stands for None in the options that files hold, since TOML has no null."""
+
+
+def to_nulls(value: Any) -> Any:
+    """Return plain values in which `NULL` stands for None."""
+    if isinstance(value, dict):
+        return {name: to_nulls(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [to_nulls(item) for item in value]
+    return dict(NULL) if value is None else value
+
+
+def from_nulls(value: Any) -> Any:
+    """Return what `to_nulls` was given."""
+    if value == NULL:
+        return None
+    if isinstance(value, dict):
+        return {name: from_nulls(item) for name, item in value.items()}
+    return [from_nulls(item) for item in value] if isinstance(value, list) else value

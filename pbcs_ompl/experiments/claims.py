@@ -64,5 +64,6 @@ def greater(claim: str, first: Mapping[Key, float], second: Mapping[Key, float],
     medians = {f"median, {name}": float(np.median(values)) if keys else None
                for name, values in zip(names, (one, other), strict=True)}
     return Claim(f"{claim} (p < {SIGNIFICANCE})", p < SIGNIFICANCE if enough else None,
-                 {**medians, "greater": rate((one > other).sum() if keys else 0, len(keys)), "p (Wilcoxon)": p},
+                 {**medians, "greater": rate((one > other).sum() if keys else 0, len(keys)),
+                  "p uncorrected (Wilcoxon)": p},
                  source, note if enough else f"fewer than {FEWEST_PAIRS} pairs: no test can decide")

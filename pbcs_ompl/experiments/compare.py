@@ -20,7 +20,8 @@ from pbcs_ompl.experiments.records import REMEDY, make_missing_runs, read_record
 from pbcs_ompl.experiments.run import Failure, Record
 from pbcs_ompl.experiments.sweep import Environment, Options, Sweep, environment_specs, make_sweep
 from pbcs_ompl.experiments.workers import Executor, Limits, make_executor
-from pbcs_ompl.results.files import CONFIG, RESULT, write_json
+from pbcs_ompl.results.checksums import write_summed_json
+from pbcs_ompl.results.files import CONFIG, RESULT
 from pbcs_ompl.results.folder import open_run, read_config
 from pbcs_ompl.results.schema import CompareConfig, RunOfComparison, check
 
@@ -62,7 +63,8 @@ class Comparison:
 @checked
 def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | Sequence[Environment], *,
             env_kwargs: Options | Sequence[Options] | None = None, goal: str | None = None,
-            feature: str | None = None, start_seed: int | None = None, seeds: int | Sequence[int] = 10,
+            feature: str | None = None, start_seed: int | None = None,
+            reset_options: Options | None = None, seeds: int | Sequence[int] = 10,
             max_transitions: int = 1_000_000, max_seconds: float | None = None, max_memory: float | None = None,
             jobs: int | Executor = 1, out: str | Path | None = None,
             on_progress: ProgressCallback | None = None) -> Comparison:
@@ -76,7 +78,7 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
         planners: Registered names or `module:attribute`, which other processes have to find; or their options by name.
         env: An environment or several: ids, `EnvSpec`s, and Gymnasium environments or models of a registered id.
         env_kwargs: Options of ids: as many as there are environments, or one of either for all of the other.
-        goal, feature, start_seed: Rules of all environments; see `pbcs_ompl.make`.
+        goal, feature, start_seed, reset_options: Rules of all environments; see `pbcs_ompl.make`.
         seeds: How many seeds (0, 1, ...), or the seeds.
         max_transitions: The most environment steps of one run.
         max_seconds: The most wall time of the search of one run; None for any. A planner that has not ended 20 seconds
@@ -95,7 +97,8 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
     """
     limits = Limits(None if max_seconds is None else max_seconds + SECONDS_OF_GRACE, max_memory)
     executor = make_executor(jobs)
-    environments = environment_specs(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
+    environments = environment_specs(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed,
+                                     reset_options=reset_options)
     sweep = make_sweep(planners, environments, seeds, max_transitions, max_seconds, max_memory)
     folder = None if out is None else Path(out)
     with nullcontext() if folder is None else open_run(folder, sweep.config(), may_change=("seeds",)):
@@ -107,7 +110,7 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
         comparison = _merge(sweep, made.records, folder)
         if folder is not None:
             write_database(folder / DATABASE, write_logs(folder, sweep, comparison.runs))
-            write_json(folder / RESULT, comparison.summary())
+            write_summed_json(folder / RESULT, comparison.summary())
     return comparison
 
 

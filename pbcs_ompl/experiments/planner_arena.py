@@ -88,7 +88,7 @@ def write_database(path: Path, logs: Sequence[Path]) -> None:
 
 def _preamble(sweep: Sweep, experiment: str, records: Sequence[Record]) -> Iterator[str]:
     yield f"OMPL version {sweep.versions['ompl']}"
-    yield f"Experiment {experiment}"
+    yield f"Experiment {_word(experiment)}"
     yield "1 experiment properties"
     yield f"transition_limit INTEGER = {sweep.max_transitions}"
     yield f"Running on {platform.machine() or 'unknown'}"  # not the name of the machine: logs are published
@@ -130,6 +130,11 @@ def _series(progress: dict[str, list[float]] | None) -> str:
 def _data(value: Any) -> str:
     """Return a number as the log has it: nothing where there is none, truth as 1 or 0."""
     return "" if value is None else str(int(value)) if isinstance(value, bool) else str(value)
+
+
+def _word(text: str) -> str:
+    """Return a name as the log has it, without spaces; different names stay different, spaces become %20."""
+    return "".join(f"%{ord(letter):02X}" if letter.isspace() or letter == "%" else letter for letter in text)
 
 
 def _block(text: str) -> Iterator[str]:

@@ -14,29 +14,21 @@ MEASURED = ("transitions", "collision_checks", "seconds", "nodes", "path_length"
             "progress", "planner_settings")
 """What the record of a run has beside what identifies it (see docs/compare.md); None in a run that failed."""
 IDENTITY = ("planner", "seed", "environment")
-WARM_UP_TRANSITIONS = 64
-WARM_UP_SECONDS = 1.0
-_warm: set[tuple[str, str]] = set()
-"""The planners and environments whose code this process has compiled."""
 
 
 def run_planner(run: Run) -> Record:
     """Plan once and return the record of it.
 
     OMPL's objects are built again for every run, so a worker that has made other runs finds what a fresh process finds.
-    Its first run of a planner in an environment is preceded by a tiny plan, so that the seconds are those of the search
-    and not of a compiler.
 
     Args:
         run: Its settings are the planner, its options, the seed, the environment (`EnvSpec.to_dict`) and the budgets.
     """
-    _warm_up(run.settings)
     _reset_peak_of_memory()
     result = _plan(run.settings)
-    reason = None if result.solved else "the budget ended before the goal was reached"
     measured = {name: value for name, value in result.summary().items() if name in MEASURED}
     return {**_identity(run), "solved": result.solved, **measured, "memory": _peak_megabytes(),
-            **_coverage(result.coverage), "planner_settings": result.planner_settings, "reason": reason}
+            **_coverage(result.coverage), "planner_settings": result.planner_settings, "reason": result.reason}
 
 
 def failed_record(run: Run, failure: Failure) -> Record:
@@ -78,14 +70,6 @@ def _coverage(coverage: Coverage | None) -> Record:
     return {"coverage": float(coverage.share[-1]),
             "progress": {"transitions": coverage.transitions.tolist(), "seconds": coverage.seconds.tolist(),
                          "coverage": coverage.share.tolist()}}
-
-
-def _warm_up(settings: dict[str, Any]) -> None:
-    key = (settings["planner"], EnvSpec.from_dict(settings["environment"]).label)
-    if key not in _warm:
-        _plan(settings, seed=0, max_transitions=min(WARM_UP_TRANSITIONS, settings["max_transitions"]),
-              max_seconds=WARM_UP_SECONDS)
-        _warm.add(key)
 
 
 def _reset_peak_of_memory() -> None:

@@ -9,7 +9,8 @@ from pbcs_ompl.core.callbacks import code_of_others
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
 from pbcs_ompl.experiments.workers import Executor, Limits
-from pbcs_ompl.results.files import RUNS, read_json, write_json
+from pbcs_ompl.results.checksums import Checksums, write_summed_json
+from pbcs_ompl.results.files import RUNS, is_there, read_json
 
 REMEDY = "remove the file to have this run made again"
 
@@ -38,14 +39,17 @@ def read_records(folder: Path, runs: Sequence[Run], kind: Any = dict[str, Any]) 
         DamagedFile: a record is damaged. It is never replaced silently: what damaged it may have damaged others.
     """
     files = {run.name: record_file(folder, run.name) for run in runs}
-    return {name: _read_record(file, kind) for name, file in files.items() if file.exists()}
+    sums = {place: Checksums(place) for place in {file.parent for file in files.values()}}
+    return {name: _read_record(file, kind, sums[file.parent]) for name, file in files.items() if is_there(file)}
 
 
-def _read_record(file: Path, kind: Any) -> Record:
+def _read_record(file: Path, kind: Any, sums: Checksums) -> Record:
     try:
         record: Record = read_json(file, kind, finite=False)  # a study may record NaN
     except DamagedFile as error:
         raise DamagedFile(f"{error}; {REMEDY}") from error
+    if sums.is_changed(file):
+        raise DamagedFile(f"{file} was changed after it was written; {REMEDY}")
     return record
 
 
@@ -80,6 +84,6 @@ def make_missing_runs(runs: Sequence[Run], function: RunFunction, known: Mapping
             else:
                 records[run.name] = found
                 if folder is not None:
-                    write_json(record_file(folder, run.name), found)
+                    write_summed_json(record_file(folder, run.name), found)
             on_end(found)
     return Results({run.name: records[run.name] for run in runs if run.name in records}, failures)

@@ -107,13 +107,13 @@ def make_sweep(planners: Sequence[str] | Mapping[str, Options], environments: Se
 
 def environment_specs(env: Environment | Sequence[Environment], env_kwargs: Options | Sequence[Options] | None = None,
                       *, goal: str | None = None, feature: str | None = None,
-                      start_seed: int | None = None) -> list[EnvSpec]:
+                      start_seed: int | None = None, reset_options: Options | None = None) -> list[EnvSpec]:
     """Return the specs of the environments of a comparison.
 
     Args:
         env: One environment or several.
         env_kwargs: Options of ids: as many as there are environments, or one of either for all of the other.
-        goal, feature, start_seed: The rules of all of them.
+        goal, feature, start_seed, reset_options: The rules of all of them.
 
     Raises:
         InvalidOption: the numbers do not match, options are given for what has its own, or an environment is not
@@ -128,22 +128,21 @@ def environment_specs(env: Environment | Sequence[Environment], env_kwargs: Opti
     if len(given) != len(options):
         raise InvalidOption(f"got {len(given)} environments and {len(options)} sets of options; expected as many, or "
                             "one of either for all of the other")
-    return [_spec(one, dict(chosen), goal, feature, start_seed) for one, chosen in zip(given, options, strict=True)]
+    rules = {"goal": goal, "feature": feature, "start_seed": start_seed, "reset_options": reset_options}
+    chosen = {name: rule for name, rule in rules.items() if rule is not None}
+    return [_spec(one, dict(kwargs), chosen) for one, kwargs in zip(given, options, strict=True)]
 
 
-def _spec(env: Environment, options: Options, goal: str | None, feature: str | None,
-          start_seed: int | None) -> EnvSpec:
+def _spec(env: Environment, options: Options, rules: dict[str, Any]) -> EnvSpec:
     if isinstance(env, str):
-        return EnvSpec(env, options, goal, feature, start_seed)
+        return EnvSpec(env, dict(options), **rules)
     spec = env if isinstance(env, EnvSpec) else make(env).spec
     if options:
         raise InvalidOption(f"{spec} has its options already; leave out env_kwargs")
     if not isinstance(env, EnvSpec) and not is_known(spec.id):
         raise InvalidOption(f"{spec} is not registered, so that other processes cannot make it; register it with "
                             "gymnasium.register, and give its id (module:id where a module registers it)")
-    return replace(spec, goal=spec.goal if goal is None else goal,
-                   feature=spec.feature if feature is None else feature,
-                   start_seed=spec.start_seed if start_seed is None else start_seed)
+    return replace(spec, **rules)
 
 
 def _resolved(planner: str, options: Options, model: ResettableModel) -> Options:

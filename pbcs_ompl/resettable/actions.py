@@ -84,6 +84,11 @@ class ActionMap:
         return 0.5 if self.first.dtype.kind in "iub" else 0.0
 
 
+def copied(action: Any) -> Any:
+    """Return a copy of an action, for an environment that may change what it is given; numbers stay numbers."""
+    return np.array(action)[()]
+
+
 def _range(space: gymnasium.Space[Any]) -> tuple[Actions, Actions]:
     """Return the lowest and the highest action, as vectors of the space's type."""
     if isinstance(space, spaces.Discrete):

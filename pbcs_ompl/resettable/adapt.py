@@ -7,26 +7,23 @@ from typing import Any, cast
 import gymnasium
 
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import InvalidOption, NotResettable
+from pbcs_ompl.core.errors import InvalidOption, NotResettable, NotVerified
 from pbcs_ompl.core.interfaces import GetSetEnv, ResettableModel, VectorisedEnv
 from pbcs_ompl.resettable.actions import ActionMap
-from pbcs_ompl.resettable.adapters.classic import AttributeEnv, VectorEnv, has_state_attribute
+from pbcs_ompl.resettable.adapters.classic import VectorEnv
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel
-from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, MujocoModel, check_observes, is_mujoco_env
+from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, MujocoModel, is_mujoco_env
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
-from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, check_replays, copies_are_faithful
 from pbcs_ompl.resettable.attributes import EnvAttributes, misspelt
-from pbcs_ompl.resettable.fresh import episode_limit, fresh_maker
+from pbcs_ompl.resettable.families import proved, restorable
+from pbcs_ompl.resettable.fresh import EnvMaker, episode_limit, fresh_maker
+from pbcs_ompl.resettable.memory.uncovered import refuse_uncovered
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
-from pbcs_ompl.resettable.supported import task_env
+from pbcs_ompl.resettable.supported import TaskMaker, task_env, task_maker
 from pbcs_ompl.resettable.task_env import bare
 
-HOW_TO = (
-    "implement `get_env_state() -> array [D]` and `set_env_state(array)` beside `step` (simple), or the "
-    "protocol `pbcs_ompl.core.interfaces.VectorisedEnv` (fast)"
-)
 MODEL_MEMBERS = {*ResettableModel.__annotations__, *(n for n in vars(ResettableModel) if not n.startswith("_"))}
 
 
@@ -35,7 +32,8 @@ def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | Featur
     """Return `env` as a `ResettableModel`; a model that is already adapted is returned as it is.
 
     The first that fits: its own `VectorisedEnv` protocol, its own `get_env_state` and `set_env_state`, MuJoCo,
-    classic control, deep copies if they prove faithful, and replayed actions, with a warning that this is slow.
+    classic control, deep copies if they prove faithful, and replayed actions, with a warning that this is slow. What
+    the toolkit guesses to be the state is proved by branching (see `branching`).
     The model moves the environment within the wrappers about: give it one of its own. Wrappers that only transform
     actions, observations or rewards stay around it (see `supported.task_env`).
 
@@ -53,27 +51,43 @@ def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | Featur
     if not isinstance(env, gymnasium.Env):
         return adapt_without_copy(env, goal=goal, feature=feature)
     make_env = fresh_maker(env)  # before anything runs in it
-    model = adapt_without_copy(env, goal=goal, feature=feature, reset_options=reset_options)
-    model.make_env = make_env
-    return model
+    return adapt_without_copy(env, goal=goal, feature=feature, reset_options=reset_options, make_env=make_env)
 
 
-def adapt_without_copy(env: Any, *, goal: str | GoalRule | None = None,
-                       feature: str | FeatureRule | None = None,
-                       reset_options: dict[str, Any] | None = None) -> ResettableModel:
-    """Return `env` as a `ResettableModel` that has no `make_env`; see `adapt`."""
+def adapt_without_copy(env: Any, *, goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None,
+                       reset_options: dict[str, Any] | None = None,
+                       make_env: EnvMaker | None = None) -> ResettableModel:
+    """Return `env` as a `ResettableModel` whose fresh environments `make_env` makes; see `adapt`."""
     if not isinstance(env, gymnasium.Env):
         if goal is not None or feature is not None:
             raise InvalidOption("a goal or feature can be given to a gymnasium.Env only, not to its adapted model")
         return _as_model(env)
     limit = episode_limit(env)
-    model = _choose(task_env(env, reset_options), goal, feature)
+    model = _choose(task_env(env, reset_options), goal, feature, task_maker(make_env, reset_options))
+    model.make_env = make_env
     if limit is not None:
         model.episode_limit = model.max_episode_steps = limit
     return model
 
 
-def _choose(inner: Any, goal: Any, feature: Any) -> ResettableModel:
+def second_model(model: ResettableModel) -> ResettableModel:
+    """Return a model of a fresh environment of the task of `model`, which nothing has run in.
+
+    Raises:
+        NotVerified: no fresh environment can be made.
+    """
+    make_inner = task_maker(model.make_env, model.spec.reset_options)
+    if make_inner is None or model.make_env is None:
+        raise NotVerified(f"no fresh environment of {model.spec.id} can be made")
+    if isinstance(model.env, RestorableEnv):
+        second = _model_of(model.env.again(make_inner()))
+    else:
+        second = adapt_without_copy(model.make_env(), reset_options=model.spec.reset_options)
+    second.spec, second.make_env = model.spec, model.make_env
+    return second
+
+
+def _choose(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None) -> ResettableModel:
     if isinstance(inner, RestorableEnv):
         return _model_of(inner)
     if isinstance(inner, SuccessFlagEnv):
@@ -84,15 +98,20 @@ def _choose(inner: Any, goal: Any, feature: Any) -> ResettableModel:
     if isinstance(inner, VectorisedEnv) and not ruled:
         return _as_model(VectorisedModel(inner))
     if isinstance(inner, GetSetEnv) and not (is_mujoco_env(inner) and not _is_vector(inner)):
-        return _model_of(VectorEnv(inner, goal, feature)) if ruled else _get_set(inner)
-    return _model_of(_restorable(inner, goal, feature))
+        return _get_set(inner, goal, feature, make_inner)
+    return _model_of(restorable(inner, goal, feature, make_inner))
 
 
-def _get_set(inner: Any) -> ResettableModel:
+def _get_set(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None) -> ResettableModel:
+    if goal is not None or feature is not None:
+        refuse_uncovered(inner)
+        return _model_of(proved(VectorEnv(inner, goal, feature), make_inner))
     offers = EnvAttributes.of(inner)
+    model = GetSetStateModel(inner if offers.goal_distance is not None else SuccessFlagEnv(inner, offers))
+    refuse_uncovered(inner)
+    proved(model.env, make_inner)
     if offers.goal_distance is not None:
-        return _as_model(GetSetStateModel(inner))
-    model = GetSetStateModel(SuccessFlagEnv(inner, offers))
+        return _as_model(model)
     if inner.spec is None:
         model.spec = EnvSpec(type(bare(inner)).__qualname__)
     return _as_model(model)
@@ -101,19 +120,6 @@ def _get_set(inner: Any) -> ResettableModel:
 def _warn_of_misspelt(env: Any) -> None:
     for name, meant in misspelt(env).items():
         warnings.warn(f"{_name(env)} has {name!r}, which is not read; did you mean {meant!r}?", stacklevel=4)
-
-
-def _restorable(inner: Any, goal: Any, feature: Any) -> RestorableEnv:
-    if is_mujoco_env(inner):
-        check_observes(inner)
-        return MujocoEnv(inner, goal, feature)
-    if has_state_attribute(inner):
-        return AttributeEnv(inner, goal, feature)
-    check_replays(inner)
-    if copies_are_faithful(inner):
-        return CopiedEnv(inner, goal, feature)
-    warnings.warn(f"{_name(inner)} is restored by replaying its actions, which is slow: {HOW_TO}", stacklevel=3)
-    return ReplayedEnv(inner, goal, feature)
 
 
 def _model_of(env: RestorableEnv) -> ResettableModel:

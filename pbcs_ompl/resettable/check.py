@@ -1,5 +1,6 @@
 """Is an environment resettable? A companion of Gymnasium's `check_env`."""
 
+import warnings
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
@@ -19,8 +20,10 @@ from pbcs_ompl.resettable.adapt import adapt
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.attributes import misspelt
+from pbcs_ompl.resettable.branching import LONG, first_difference
 from pbcs_ompl.resettable.make import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.resettable.supported import task_maker
 
 STEPS = 30
 
@@ -79,13 +82,14 @@ class _Roll:
 def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
                      env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
                      feature: str | FeatureRule | None = None, start_seed: int | None = None,
-                     seed: int = 0) -> ResetReport:
+                     reset_options: dict[str, Any] | None = None, seed: int = 0) -> ResetReport:
     """Check that an environment continues from a restored state as it did before, bit for bit.
 
     What is wrong with an environment is in the report; what is wrong with the arguments is raised.
 
     Args:
-        env, env_kwargs, goal, feature, start_seed: See `pbcs_ompl.make`. An environment that is given is moved about.
+        env, env_kwargs, goal, feature, start_seed, reset_options: See `pbcs_ompl.make`. An environment that is given is
+            moved about.
         seed: Seed of the actions and states that are tried.
 
     Raises:
@@ -93,7 +97,7 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
     """
     name = env if isinstance(env, str) else type(env).__name__
     try:
-        model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed)
+        model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options)
     except (UnknownName, InvalidOption, MissingDependency):
         raise
     except Exception as error:  # an author's mistake is a finding, not a crash
@@ -109,6 +113,7 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
         ("a restored state continues as before", trial.restored),
         ("the same after other steps and another reset", trial.disturbed),
         ("the same in a second instance", trial.elsewhere),
+        ("branches continue as in fresh instances", trial.branches),
         ("returned arrays are copies", trial.copies),
         ("optional attributes have the names that are read", trial.spelling),
         ("transition equals step", trial.transition_is_step),
@@ -132,7 +137,7 @@ class _Trial:
     """The checks on one model; each returns what it found wrong, or an empty string."""
 
     def __init__(self, model: Any, seed: int):
-        self.model = model
+        self.model, self.seed = model, seed
         self.env: Any = model.env
         self.actions = ActionMap.of(model.env.action_space)
         rng = np.random.default_rng(seed)
@@ -158,7 +163,7 @@ class _Trial:
         return self.first.difference(self.roll(self.env, self.start))
 
     def disturbed(self) -> str:
-        self.env.reset(seed=12345)
+        self.env.reset(seed=12345, options=self.model.spec.reset_options)
         for action in self.actions.to_actions(self.controls[::-1]):
             _, _, terminated, truncated, _ = self.env.step(action)
             if terminated or truncated:
@@ -166,15 +171,26 @@ class _Trial:
         return self.first.difference(self.roll(self.env, self.start))
 
     def elsewhere(self) -> str:
-        if self.model.make_env is None:
-            return self.first.difference(self.roll(deepcopy(self.env), self.start))
-        spec = self.model.spec
-        other: Any = adapt(self.model.make_env(), goal=spec.goal, feature=spec.feature,
-                           reset_options=spec.reset_options).env
+        other = self._second()
         other.reset(seed=54321)
         found = self.first.difference(self.roll(other, self.start))
         other.close()
         return found
+
+    def _second(self) -> Any:
+        if self.model.make_env is None:
+            return deepcopy(self.env)
+        spec = self.model.spec
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the first instance has warned
+            return adapt(self.model.make_env(), goal=spec.goal, feature=spec.feature,
+                         reset_options=spec.reset_options).env
+
+    def branches(self) -> str:
+        make_inner = task_maker(self.model.make_env, self.model.spec.reset_options)
+        if make_inner is None:
+            return ""
+        return first_difference(self.env, make_inner, steps=LONG, seed=self.seed + 1)
 
     def spelling(self) -> str:
         return "; ".join(f"{name!r} is not read; did you mean {meant!r}?"

@@ -90,6 +90,6 @@ def spec_of(env: gymnasium.Env[Any, Any]) -> EnvSpec:
     if env.spec is None:
         return EnvSpec(name)
     registered = gymnasium.registry[env.spec.id].kwargs if env.spec.id in gymnasium.registry else {}
-    return EnvSpec(name, {name: value for name, value in env.spec.kwargs.items()
-                                 if name != "render_mode" and repr(value) != repr(registered.get(name))})
+    return EnvSpec(name, {option: value for option, value in env.spec.kwargs.items() if option != "render_mode"
+                          and (option not in registered or repr(value) != repr(registered[option]))})
 

@@ -126,7 +126,8 @@ def _planner(config: dict[str, Any]) -> Words:
 
 def _rule_words(spec: EnvSpec) -> Words:
     rules = {"--goal": spec.goal, "--feature": spec.feature, "--start-seed": spec.start_seed}
-    return [f"{name}={value}" for name, value in rules.items() if value is not None]
+    words = [f"{name}={value}" for name, value in rules.items() if value is not None]
+    return [*words, *_json_words("--reset-options", spec.reset_options or {})]
 
 
 def _json_words(option: str, values: dict[str, Any]) -> Words:

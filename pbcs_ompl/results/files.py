@@ -90,7 +90,7 @@ def write_text(path: Path, text: str) -> None:
 
 def write_json(path: Path, value: Any) -> None:
     """Write JSON atomically; NumPy numbers and arrays become plain ones."""
-    write_text(path, json.dumps(value, indent=2, default=plain, ensure_ascii=False) + "\n")
+    write_text(path, to_json(value))
 
 
 def write_toml(path: Path, table: dict[str, Any]) -> None:
@@ -101,6 +101,11 @@ def write_toml(path: Path, table: dict[str, Any]) -> None:
 def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:
     """Write arrays as one compressed npz, atomically."""
     write_atomically(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
+
+
+def is_there(path: Path) -> bool:
+    """Return whether there is a file of this name, even a broken link or a pipe: reading it says what is wrong."""
+    return os.path.lexists(path)
 
 
 def read_json(path: Path, kind: Any = Any, *, finite: bool = True) -> Any:
@@ -191,6 +196,11 @@ def _read(path: Path, load: Callable[[], Content]) -> Content:
         raise DamagedFile(f"{path} does not exist") from error
     except Exception as error:  # zipfile, zlib, ValueError, EOFError, OSError: all mean the same to the user
         raise DamagedFile(f"{path} is damaged: {error}") from error
+
+
+def to_json(value: Any) -> str:
+    """Return a value as JSON; NumPy values and paths become plain ones."""
+    return json.dumps(value, indent=2, default=plain, ensure_ascii=False) + "\n"
 
 
 def to_toml(table: dict[str, Any]) -> str:

@@ -11,17 +11,17 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from pbcs_ompl.core.errors import DamagedFile, RunFolderError
+from pbcs_ompl.results.checksums import SUMS, write_summed_json, write_summed_toml
 from pbcs_ompl.results.files import (
     CONFIG,
     PROVENANCE,
     RESULT,
+    is_there,
     read_json,
     read_toml,
     sweep_temporaries,
     to_toml,
     write_errors,
-    write_json,
-    write_toml,
 )
 from pbcs_ompl.results.provenance import provenance
 from pbcs_ompl.results.schema import CONFIGS, RESULTS, Provenance, check
@@ -57,7 +57,7 @@ class RunFolder:
     def _check(self, resume: bool) -> None:
         if resume and not (self.path / CONFIG).is_file():
             raise RunFolderError(f"nothing to resume: {self.path / CONFIG} does not exist")
-        leftovers = (LOCK, f".{CONFIG}.")  # of a process that was killed before it wrote its settings
+        leftovers = (LOCK, SUMS, f".{CONFIG}.")  # of a process that was killed before it wrote its settings
         if not resume and self.path.is_dir() and any(not p.name.startswith(leftovers) for p in self.path.iterdir()):
             raise RunFolderError(f"{self.path} already exists; choose another --out, or remove it first")
 
@@ -77,19 +77,19 @@ class RunFolder:
         Args:
             config: Plain values, among them `kind`, one of `KINDS`.
         """
-        write_toml(self.path / CONFIG, config)
+        write_summed_toml(self.path / CONFIG, config)
         self._note_provenance()
 
     def _note_provenance(self) -> None:
         """Add this process to those that worked here, unless one with the same versions and machine did."""
         path = self.path / PROVENANCE
-        before = read_json(path, Provenance) if path.is_file() else []
+        before = read_json(path, Provenance) if is_there(path) else []
         if provenance() not in before:
-            write_json(path, [*before, provenance()])
+            write_summed_json(path, [*before, provenance()])
 
     def write_result(self, result: dict[str, Any]) -> None:
         """Write what the run found, as JSON."""
-        write_json(self.path / RESULT, result)
+        write_summed_json(self.path / RESULT, result)
 
 
 def _locked(path: Path, shard: str) -> ExitStack:
@@ -231,7 +231,7 @@ def read_folder(path: Path) -> Folder:
     config = read_config(path)
     kind = config["kind"]
     check(path / CONFIG, config, CONFIGS[kind])
-    result = read_json(path / RESULT, RESULTS[kind], finite=kind != "study") if (path / RESULT).exists() else None
+    result = read_json(path / RESULT, RESULTS[kind], finite=kind != "study") if is_there(path / RESULT) else None
     return Folder(path, config["kind"], config, result, _provenance(path, config))
 
 
@@ -253,7 +253,7 @@ def read_config(path: Path, kind: str | None = None) -> dict[str, Any]:
 
 
 def _provenance(path: Path, config: dict[str, Any]) -> list[dict[str, str]]:
-    if not (path / PROVENANCE).is_file():
+    if not is_there(path / PROVENANCE):
         return [config["versions"]] if "versions" in config else []
     found: list[dict[str, str]] = read_json(path / PROVENANCE, Provenance)
     return found

@@ -20,14 +20,15 @@ from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.signals import interruptible
 from pbcs_ompl.core.types import Array, Counter, ProgressCallback
 from pbcs_ompl.resettable.task import Task
-from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, read_json, read_toml, write_json
+from pbcs_ompl.results.checksums import write_summed_json
+from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.results.provenance import planning_versions
 from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.config import METHODS, TrainConfig
 from pbcs_ompl.skills.evaluation import Evaluation, evaluate_chain
-from pbcs_ompl.skills.method import TrainingMethod, read_checkpoint, write_checkpoint
+from pbcs_ompl.skills.method import TrainingMethod, restore, write_checkpoint
 from pbcs_ompl.skills.settings import CriterionSettings, PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
@@ -89,6 +90,10 @@ class TrainResult:
                 "updates": self.updates, "seconds": self.seconds, "seed": self.seed, "out": self.out}
 
 
+WARM_UP_ROWS = 256
+"""Transitions of a first update."""
+
+
 class Training:
     """A run: its configuration, its folder (if any), its clock.
 
@@ -116,7 +121,20 @@ class Training:
     def run(self, trajectory: Trajectory | None) -> TrainResult:
         """Plan (or take the plan that is given or was made before), train, evaluate and write."""
         with one_thread():
+            self._warm_up()
             return self._run(trajectory)
+
+    def _warm_up(self) -> None:
+        """Make an update of an agent that is thrown away: the reported seconds are not those of a compiler."""
+        agent = self.config.agent_factory(self.model)(0)
+        observations = np.zeros((1, WARM_UP_ROWS, self.model.observation_size))
+        actions = np.tile(self.model.action_low, (1, WARM_UP_ROWS, 1))
+        rewards, terminals = np.zeros((1, WARM_UP_ROWS)), np.zeros((1, WARM_UP_ROWS), dtype=np.bool_)
+        with code_of_others("the agent"):
+            agent.add_transitions(observations, actions, rewards, observations, terminals)
+            agent.train(1)
+        self.began = time.perf_counter()
+        self.next_checkpoint = self.began + FIRST_CHECKPOINT_SECONDS
 
     def _run(self, trajectory: Trajectory | None) -> TrainResult:
         if self.folder and not self.resumed:
@@ -135,7 +153,7 @@ class Training:
 
     def _plan(self, trajectory: Trajectory | None) -> tuple[Trajectory | None, int, str | None]:
         """Return the plan, the transitions it took, and why there is none to train along."""
-        if self.path and self.resumed and (self.path / PLAN).is_file():
+        if self.path and self.resumed and is_there(self.path / PLAN):
             trajectory = Trajectory.load(self.path / TRAJECTORY)
             self._check_replays(trajectory)
             return trajectory, read_json(self.path / PLAN, PlanEffort)["transitions"], None
@@ -164,7 +182,7 @@ class Training:
     def _keep_plan(self, trajectory: Trajectory, transitions: int) -> None:
         if self.path:
             trajectory.save(self.path / TRAJECTORY)
-            write_json(self.path / PLAN, {"transitions": transitions})
+            write_summed_json(self.path / PLAN, {"transitions": transitions})
 
     def _check_replays(self, trajectory: Trajectory) -> None:
         """Refuse a trajectory that is not true here; the replay also visits its states, where only those are restored.
@@ -191,10 +209,8 @@ class Training:
         trainer = SkillTrainer(self.config.agent_factory(self.model), self._waypoints(trajectory),
                                self.settings.episodes, counter, self.seeds.child("skills").generator())
         method = METHODS[self.config.method].build(trainer, self.settings)
-        if self.path and self.resumed and (self.path / CHECKPOINT).is_file():
-            snapshot, seconds = read_checkpoint(self.path / CHECKPOINT)
-            method.restore(snapshot)
-            self.began -= seconds
+        if self.path and self.resumed and is_there(self.path / CHECKPOINT):
+            self.began -= restore(method, self.path / CHECKPOINT)
         return method
 
     def _waypoints(self, trajectory: Trajectory | None) -> Waypoints:

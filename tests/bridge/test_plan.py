@@ -35,7 +35,7 @@ from pbcs_ompl.results.files import read_toml
 MAZE = "pbcs/Maze-v0"
 SUMMARY = ["solved", "found", "reason", "transitions", "collision_checks", "seconds", "nodes", "path_length",
            "replay_ok", "planner", "env", "seed", "out"]
-FILES = ["config.toml", "provenance.json", "result.json", "trajectory.npz", "tree.npz"]
+FILES = [".sha256", "config.toml", "provenance.json", "result.json", "trajectory.npz", "tree.npz"]
 STOCK = [oc.RRT, oc.EST, oc.KPIECE1]
 
 

@@ -1,5 +1,6 @@
 """Environments with get_env_state, set_env_state and a step, and the faults that the check finds in them."""
 
+import re
 from typing import Any
 
 import gymnasium
@@ -122,7 +123,8 @@ def test_the_observation_serves_as_state_and_gives_the_bounds() -> None:
             return self.state.copy(), {}
 
         def step(self, action: Any) -> Any:
-            return self.state.copy(), *super().step(action)[1:]
+            _, *rest = super().step(action)
+            return self.state.copy(), *rest
 
     class Unobserved(Plain):
         observe = property()  # type: ignore[assignment]
@@ -199,16 +201,16 @@ class Hidden(Cart):
 
 
 @pytest.mark.parametrize(("fault", "failing"), [
-    (Forgetful, "come back as set"),
+    (Forgetful, "attribute 'state'.*set_env_state does not set it"),
     (Aliased, "returned arrays are copies"),
-    (Noisy, "continues as before"),
-    (Raising, "can be stepped: ZeroDivisionError: oh no"),
-    (Hidden, "continues as before"),
+    (Noisy, "steps are random: fresh instances differ in state"),
+    (Raising, "ZeroDivisionError: oh no"),
+    (Hidden, "attribute 'ticks'"),
 ])
 def test_faults_are_described_and_never_raised(fault: type[Cart], failing: str) -> None:
     report = check_resettable(fault())
     assert not report.ok
-    assert any(failing in str(check) and not check.ok for check in report.checks), str(report)
+    assert any(re.search(failing, str(check)) and not check.ok for check in report.checks), str(report)
     assert "FAIL" in str(report)
 
 

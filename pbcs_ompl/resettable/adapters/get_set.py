@@ -74,7 +74,7 @@ class GetSetStateModel(Model):
 
     def goal_distance(self, states: Array) -> Array:
         """Return the distances [B] of states [B, D] to the goal."""
-        return np.asarray(self._goal_distance(np.asarray(states, dtype=np.float64)), dtype=np.float64)
+        return np.asarray(self._goal_distance(np.array(states, dtype=np.float64)), dtype=np.float64)
 
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, D] are within the bounds and valid for the environment [B]."""

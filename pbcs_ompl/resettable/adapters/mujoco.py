@@ -9,15 +9,17 @@ import gymnasium
 import numpy as np
 
 from pbcs_ompl.core.errors import InvalidState, MissingDependency, NotResettable
-from pbcs_ompl.core.types import Array, IndexArray
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel, Step
+from pbcs_ompl.resettable.adapters.mujoco_probe import find_read_first
+from pbcs_ompl.resettable.adapters.mujoco_state import PHYSICS, ModelParts, Physics
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes, plain_copies
+from pbcs_ompl.resettable.memory.memory import GUARD_EVERY, Memory
 from pbcs_ompl.resettable.rules import FeatureRule, Outcome, feature_rule
 from pbcs_ompl.resettable.supported import task_env
 from pbcs_ompl.resettable.task_env import bare
 
-MOVED_BY_RESET = ("body_pos", "body_quat", "site_pos", "geom_pos")
-"""Parts of a model that environments move about in `reset`: goals, hinges, boards."""
 BROKEN = "4.0.0"
 """The version that computes wrong accelerations where the constraint Jacobian is sparse."""
 
@@ -28,24 +30,32 @@ def is_mujoco_env(env: Any) -> bool:
 
 
 class MujocoEnv(RestorableEnv):
-    """Saves [FULLPHYSICS and warm start | what `reset` moves in the model | the goal].
+    """Saves [integration state | what is read before it is written | what changes in the model | attributes].
 
-    The warm start is what makes a restored simulation continue bit for bit. Before each step the positions of
-    bodies are computed afresh, so that rewards that read them depend on the state alone; physics is untouched.
+    What beside MuJoCo's integration state is state is found by exploration; see `mujoco_state` and `memory`.
     """
 
     def __init__(self, inner: Any, goal: Any = None, feature: Any = None):
         import mujoco
 
         self._mujoco: Any = mujoco  # its functions have no types
-        self._kinds = _state_kinds(mujoco, inner.model)
-        self._physics = int(self._mujoco.mj_stateSize(inner.model, self._kinds))
-        self._parts, self._has_goal = _moved_parts(inner)
-        self._loaded = False
-        self.goal_radius = float(getattr(inner, "distance_threshold", MAZE_GOAL_RADIUS))
         if mujoco.__version__ == BROKEN and self._mujoco.mj_isSparse(inner.model):
             warnings.warn(f"mujoco {BROKEN} computes wrong accelerations for this model, whose constraint Jacobian is "
                           f"sparse; install mujoco 4.0.1 or newer, or 3.x", stacklevel=2)
+        self.inner, before = inner, plain_copies(inner)
+        self._physics, self._parts = Physics(mujoco, inner.model), ModelParts(inner.model)
+        self._first_physics = self._physics.save(inner.model, inner.data)
+        inner.reset(seed=SEEDS[0])
+        self._parts.look(inner.model, after_reset=True)
+        self._has_goal = isinstance(given := getattr(inner, "goal", None), np.ndarray) and given.ndim == 1
+        changes = Changes(inner)
+        for event in episodes(inner):
+            changes.add(event)
+            self._parts.look(inner.model, after_reset=event == "reset")
+        self._memory = Memory(inner, changes, before, known=(inner.data,))
+        self._read_first = find_read_first(inner, lambda: _observed(inner), self._physics, self._parts, self._memory)
+        self._saves = 0
+        self.goal_radius = float(getattr(inner, "distance_threshold", MAZE_GOAL_RADIUS))
         super().__init__(inner, goal, feature)
         self.walls = wall_rectangles(inner.maze) if has_map(inner) else np.empty((0, 4))
 
@@ -55,48 +65,55 @@ class MujocoEnv(RestorableEnv):
             return feature_rule("achieved_goal")
         return feature_rule("qpos[0:2]" if self.inner.model.nq > 1 else "qpos[0]")
 
-    def save(self) -> Array:
-        """Return physics, moved parts and goal."""
-        self._loaded = False
-        return self._save()
-
-    def load(self, saved: Array) -> None:
-        """Go back to what `save` returned; positions of bodies are up to date afterwards."""
-        model, data, at = self.inner.model, self.inner.data, self._physics
-        if len(saved) < at or not np.isfinite(saved).all():
-            raise InvalidState(f"expected {at} or more finite numbers for {type(self.inner).__name__}")
-        for name, rows in self._parts:
-            part = getattr(model, name)[rows]
-            getattr(model, name)[rows] = saved[at:at + part.size].reshape(part.shape)
-            at += part.size
-        if self._has_goal:
-            self.inner.goal[:] = saved[at:]
-        self._mujoco.mj_setState(model, data, saved[:self._physics], self._kinds)
-        self._mujoco.mj_kinematics(model, data)
-        self._mujoco.mj_comPos(model, data)
-        self._loaded = True
-
-    def step(self, action: Array) -> Any:
-        """Make one step of the environment."""
-        if not self._loaded:
-            self.load(self._save())
-        self._loaded = False
-        return super().step(action)
+    def attach(self) -> None:
+        """Let the memory refer to `inner`."""
+        self._memory = self._memory.of(self.inner)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-        """Reset the environment."""
-        self._loaded = False
+        """Reset the environment as if nothing had run in it before."""
+        self._memory.clear()
+        self._parts.clear(self.inner.model)
+        self._physics.load(self.inner.model, self.inner.data, self._first_physics)
         return super().reset(seed=seed, options=options)
 
+    def save(self) -> Array:
+        """Return physics, what is read before it is written, what changes in the model, and attributes."""
+        self._saves += 1
+        if self._saves % GUARD_EVERY == 0:
+            self._parts.check(self.inner)
+        model, data = self.inner.model, self.inner.data
+        return np.concatenate([self._physics.save(model, data), self._read_first.save(data), self._parts.save(model),
+                               self._memory.save()])
+
+    def load(self, saved: Array) -> None:
+        """Go back to what `save` returned; positions of bodies are computed, but for those that are saved."""
+        sizes = (self._physics.size, self._read_first.size, self._parts.size, self._memory.size)
+        if len(saved) != sum(sizes) or not np.isfinite(saved).all():
+            raise InvalidState(f"expected {sum(sizes)} finite numbers for {type(self.inner).__name__}")
+        a, b, c = sizes[0], sizes[0] + sizes[1], sizes[0] + sizes[1] + sizes[2]
+        model, data = self.inner.model, self.inner.data
+        self._parts.load(model, saved[b:c])
+        self._memory.load(saved[c:])
+        self._physics.load(model, data, saved[:a])
+        self._mujoco.mj_kinematics(model, data)
+        self._mujoco.mj_comPos(model, data)
+        self._read_first.load(data, saved[a:b])
+
     def observation(self) -> Any:
-        """Return what the environment observes after `mj_forward`; contact forces are those of the state itself."""
-        self._mujoco.mj_forward(self.inner.model, self.inner.data)
-        self._mujoco.mj_rnePostConstraint(self.inner.model, self.inner.data)
-        agent = _agent(self.inner)
-        if agent is None:
-            return self.inner._get_obs()
-        seen = agent._get_obs()
-        return self.inner._get_obs(seen[0] if isinstance(seen, tuple) else seen)
+        """Return what the environment observes after `mj_forward`, but for the numbers that are saved."""
+        model, data = self.inner.model, self.inner.data
+        physics, read_first = self._physics.save(model, data), self._read_first.save(data)
+        self._mujoco.mj_forward(model, data)
+        self._mujoco.mj_rnePostConstraint(model, data)
+        self._physics.load(model, data, physics)  # the warm start
+        self._read_first.load(data, read_first)
+        return _observed(self.inner)
+
+    def named_state(self, env: Any) -> dict[str, Any]:
+        """Return the parts of the state of an environment of this class, by name."""
+        physics = {name: np.array(getattr(env.data, name)) for name in sorted(PHYSICS) if hasattr(env.data, name)}
+        return {"time": env.data.time, **physics, **self._parts.values(env.model),
+                **self._read_first.values(env.data), **self._memory.values(env)}
 
     def render(self) -> Any:
         """Render the environment; a camera that follows the robot is where the restored robot is."""
@@ -122,13 +139,6 @@ class MujocoEnv(RestorableEnv):
         for row, state, other in zip(rows, states, others, strict=True):  # saved states begin with the time
             self._mujoco.mj_differentiatePos(model, row, 1.0, np.array(other[1:1 + nq]), np.array(state[1:1 + nq]))
         return rows
-
-    def _save(self) -> Array:
-        saved = np.empty(self._physics)
-        self._mujoco.mj_getState(self.inner.model, self.inner.data, saved, self._kinds)
-        parts = [getattr(self.inner.model, name)[rows].ravel() for name, rows in self._parts]
-        goal = [self.inner.goal.ravel()] if self._has_goal else []
-        return np.concatenate([saved, *parts, *goal])
 
 
 MAZE_GOAL_RADIUS = 0.45
@@ -163,41 +173,17 @@ class MujocoModel(GetSetStateModel):
     def _open_pool(self) -> None:
         assert self.make_env is not None
         for _ in range(self._threads - 1):
-            inner = task_env(self.make_env(), self.spec.reset_options)
-            self._others.append(MujocoEnv(inner, self.env.goal_rule, self.env.feature_rule))
+            self._others.append(self.env.again(task_env(self.make_env(), self.spec.reset_options)))
         self._pool = ThreadPoolExecutor(self._threads - 1, thread_name_prefix="mujoco")
 
 
-def _state_kinds(mujoco: Any, model: Any) -> int:
-    kinds = int(mujoco.mjtState.mjSTATE_FULLPHYSICS) | int(mujoco.mjtState.mjSTATE_WARMSTART)
-    if model.nmocap:
-        kinds |= int(mujoco.mjtState.mjSTATE_MOCAP_POS) | int(mujoco.mjtState.mjSTATE_MOCAP_QUAT)
-    if model.neq:
-        kinds |= int(mujoco.mjtState.mjSTATE_EQ_ACTIVE)
-    return kinds
-
-
-def _moved_parts(env: Any) -> tuple[list[tuple[str, IndexArray]], bool]:
-    """Return the rows of the model that two resets leave different, and whether the environment has a goal."""
-    seen = []
-    for seed in (0, 1, 2):
-        env.reset(seed=seed)
-        seen.append({name: getattr(env.model, name).copy() for name in MOVED_BY_RESET})
-    parts = []
-    for name in MOVED_BY_RESET:
-        moved = np.any([(seen[0][name] != later[name]).any(axis=1) for later in seen[1:]], axis=0)
-        if moved.any():
-            parts.append((name, np.flatnonzero(moved)))
-    goal = getattr(env, "goal", None)
-    return parts, isinstance(goal, np.ndarray) and goal.ndim == 1
-
-
-def _agent(env: Any) -> Any:
-    """Return the environment inside a maze of gymnasium-robotics, None for others."""
-    for name in ("point_env", "ant_env"):
-        if hasattr(env, name):
-            return getattr(env, name)
-    return None
+def _observed(env: Any) -> Any:
+    """Return the observation of an environment; of a maze of gymnasium-robotics, with that of the agent in it."""
+    agent = next((getattr(env, name) for name in ("point_env", "ant_env") if hasattr(env, name)), None)
+    if agent is None:
+        return env._get_obs()
+    seen = agent._get_obs()
+    return env._get_obs(seen[0] if isinstance(seen, tuple) else seen)
 
 
 def check_observes(env: Any) -> None:

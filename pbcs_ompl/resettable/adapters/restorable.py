@@ -3,7 +3,8 @@
 import math
 import warnings
 from abc import ABC, abstractmethod
-from typing import Any
+from copy import copy
+from typing import Any, Self
 
 import gymnasium
 import numpy as np
@@ -11,6 +12,7 @@ from gymnasium.spaces import Box
 
 from pbcs_ompl.core.errors import CallbackFailed
 from pbcs_ompl.core.types import Array, Capability
+from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.feature_bounds import feature_bounds, narrow_words
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rules import (
@@ -43,6 +45,8 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
 
     capabilities: frozenset[Capability] = frozenset({"visited", "exact"})
     perturb_by_rollouts = True
+    exploring = False
+    """Whether steps are made only to see what range the feature has."""
     goal_radius = 1.0
     """A state is a success if its distance to the goal is smaller, where the environment reports one."""
 
@@ -63,13 +67,26 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.goal_threshold = self.goal_radius if self._has_goal_distance else 0.5
         saved = len(self.save())
         self.feature_dims = tuple(range(len(self._head)))
+        self.exploring = True
         self.bounds = feature_bounds(self)
+        self.exploring = False
         if self.bounds.narrow:
             warnings.warn(narrow_words(self.bounds), stacklevel=2)
         rest = np.full(saved + 1, UNBOUNDED)
         self.state_low = np.concatenate([self.bounds.low, -rest])
         self.state_high = np.concatenate([self.bounds.high, rest])
         self.reset(seed=0)
+
+    def again(self, inner: Any) -> Self:
+        """Return the adapter of another instance of the environment, without exploring that one."""
+        other = copy(self)
+        other.inner = inner
+        other.attach()
+        other.reset(seed=0)
+        return other
+
+    def attach(self) -> None:
+        """Let what refers to the environment refer to `inner`."""
 
     @abstractmethod
     def save(self) -> Array:
@@ -103,6 +120,14 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         """Return the bounds [F] of the feature; None where they have to be explored."""
         return None
 
+    def named_state(self, env: Any) -> dict[str, Any]:
+        """Return the parts of the state of an environment like `inner`, by name, to compare them; empty if unknown."""
+        return {}
+
+    def is_success(self, outcome: Outcome) -> bool:
+        """Return whether an outcome is a success."""
+        return bool(self._is_success(outcome))
+
     def difference(self, states: Array, others: Array) -> Array:
         """Return the differences [B, K] between saved states [B, S] that `distance` measures, before features."""
         return np.empty((len(states), 0))
@@ -115,7 +140,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Make one step of the environment."""
-        observation, reward, terminated, truncated, info = self.inner.step(action)
+        observation, reward, terminated, truncated, info = self.inner.step(copied(action))
         success = self._store(Outcome(self.inner, observation, float(reward), bool(terminated), info))
         return flat(observation), float(reward), bool(terminated), bool(truncated), {**info, "is_success": success}
 
@@ -174,7 +199,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self._head = np.asarray(self._feature_of(outcome._replace(named=self.named)), dtype=np.float64).reshape(-1)
         if not len(self._head):
             raise CallbackFailed("the feature function returned no numbers")
-        success = bool(self._is_success(outcome))
+        success = self.is_success(outcome)
         seen = outcome._replace(observation=self.named)
         reported = None if self.goal_rule is not None else self.reported_goal_distance(seen)
         self._has_goal_distance = reported is not None

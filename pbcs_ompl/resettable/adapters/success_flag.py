@@ -7,10 +7,12 @@ import numpy as np
 
 from pbcs_ompl.core.errors import NotResettable
 from pbcs_ompl.core.types import Array, BoolArray
+from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.bounds import widened
 from pbcs_ompl.resettable.observations import flat_bounds
 from pbcs_ompl.resettable.observing import missing_observe, observed_type, reset_options, state_observer
+from pbcs_ompl.resettable.rules import Outcome, reported_success
 from pbcs_ompl.resettable.sampling import uniform_in_ball
 from pbcs_ompl.resettable.task_env import bare
 
@@ -19,8 +21,8 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
     """An environment with `get_env_state` and `set_env_state` but no `goal_distance`.
 
     Its state is [state of the environment N | success]. The last number is 1 where the step that led there was a
-    success: what `info["is_success"]` or `info["success"]` says, else `terminated`. So success is a function of the
-    state, in any process. States that no step has reached, as those of a reset or of a ball, are no successes.
+    success (see `rules.reported_success`). So success is a function of the state, in any process. States that no step
+    has reached, as those of a reset or of a ball, are no successes.
 
     Args:
         inner: The environment without wrappers.
@@ -61,8 +63,9 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Make one step of the environment."""
-        observation, reward, terminated, truncated, info = self.inner.step(action)
-        self._success = float(bool(info.get("is_success", info.get("success", terminated))))
+        observation, reward, terminated, truncated, info = self.inner.step(copied(action))
+        outcome = Outcome(self.inner, observation, float(reward), bool(terminated), info)
+        self._success = float(reported_success(outcome))
         return observation, float(reward), bool(terminated), bool(truncated), info
 
     def get_env_state(self) -> Array:

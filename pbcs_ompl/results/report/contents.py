@@ -158,7 +158,8 @@ def _row(row: dict[str, Any]) -> list[Any]:
 def _tests(found: Comparison) -> list[Table]:
     rows = [[test["environment"], *test["planners"], *test["fewer"], test["ties"], f"{test['p']:.2g}",
              f"{test['p_holm']:.2g}"] for test in found.tests]
-    columns = ("environment", "planner A", "planner B", "A needs less", "B needs less", "ties", "p", "p (Holm)")
+    columns = ("environment", "planner A", "planner B", "A needs less", "B needs less", "ties", "p uncorrected",
+               "p (Holm)")
     return [Table("Number of seeds in which either of two planners needs fewer transitions (sign tests)", columns,
                   rows, folded=True)] if rows else []
 

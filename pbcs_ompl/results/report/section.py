@@ -1,13 +1,14 @@
 """One result folder as a section of a report."""
 
 import base64
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
 from PIL import Image
 
 from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.results.checksums import changed_files
 from pbcs_ompl.results.files import CONFIG, FIGURES, RUNS, read_bytes
 from pbcs_ompl.results.folder import read_folder
 from pbcs_ompl.results.report.contents import Content, Table, read_content
@@ -78,7 +79,10 @@ def make_section(path: Path, root: Path) -> Section:
     pictures = sorted([*path.glob("*.png"), *path.glob(f"{FIGURES}/*.png")])
     _check_inside(path, [*path.glob("*.json"), *path.glob("*.toml"), *path.glob(f"{RUNS}/**/*.json"), *pictures])
     folder = read_folder(path)
-    return Section(_name(path, root), folder.kind, read_content(folder), [read_figure(picture) for picture in pictures],
+    content = read_content(folder)
+    changed = [(str(file), "was changed or removed after it was written") for file in changed_files(path)]
+    content = replace(content, failures=[*changed, *content.failures])
+    return Section(_name(path, root), folder.kind, content, [read_figure(picture) for picture in pictures],
                    read_bytes(path / CONFIG).decode("utf-8"), _versions(folder.provenance), repeating(folder),
                    resuming(folder))
 

@@ -14,6 +14,7 @@ from pbcs_ompl.figures.canvas import new_figure, save
 LATE = 10
 """Episodes of the actor itself that say what has become of it; the thesis smooths over as many."""
 LEVEL, TOO_FEW = 0.05, "too few seeds to decide"
+P_VALUE = "p uncorrected (rank test)"
 GOOD, SOLVED = 0.975, 0.95
 """Shares of the best return: the thesis asks the first of the good policy; we call a mean above the second solved."""
 
@@ -76,7 +77,7 @@ def _compared(variants: dict[str, Variant]) -> list[Claim]:
         p = _rank_test(variants[one], variants[other])
         claims.append(Claim(f"priming does not change DDPG-argmax (rank test of its late returns: p >= {LEVEL})",
                             None if p is None else p >= LEVEL,
-                            {one: variants[one].numbers, other: variants[other].numbers, "p": p},
+                            {one: variants[one].numbers, other: variants[other].numbers, P_VALUE: p},
                             "[Matheron2020] Fig. 6.11", "" if p is not None else TOO_FEW))
     return claims
 
@@ -84,7 +85,7 @@ def _compared(variants: dict[str, Variant]) -> list[Claim]:
 def _above(words: str, one: Variant, other: Variant, name: str, against: str, source: str) -> Claim:
     p = _rank_test(one, other)
     return Claim(f"{words} (mean return of the last {LATE} episodes)", bool(one.late.mean() > other.late.mean()),
-                 {name: one.numbers, against: other.numbers, "p of a rank test": p}, f"[Matheron2020] {source}",
+                 {name: one.numbers, against: other.numbers, P_VALUE: p}, f"[Matheron2020] {source}",
                  TOO_FEW if p is None else "" if p < LEVEL else "it may be chance")
 
 

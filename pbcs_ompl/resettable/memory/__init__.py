@@ -1,0 +1,1 @@
+"""What an environment keeps in Python attributes: found, saved and restored, or refused by name."""

@@ -1,0 +1,145 @@
+"""What an environment owns: the values of its attributes, and of the objects in them."""
+
+import functools
+import random
+import sys
+import types
+from collections import deque
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+
+from pbcs_ompl.resettable.memory.plain_values import is_plain
+from pbcs_ompl.resettable.task_env import bare
+
+NOT_STATE = frozenset({"np_random", "_np_random", "_np_random_seed", "spec", "metadata", "action_space",
+                       "observation_space", "render_mode", "mujoco_renderer"})
+"""Attributes that every environment may have and that no step depends on; generators are looked at by themselves."""
+LIBRARIES = frozenset({"numpy", "gymnasium", "mujoco", "glfw", "OpenGL", "pygame", "PIL", "cv2", "imageio",
+                       "matplotlib", "logging", "numba", "xml"})
+"""Packages whose objects are no state of an environment: spaces, renderers, logs. Generators are looked at apart."""
+DEEPEST = 6
+MOST_OBJECTS = 2000
+GENERATORS = (np.random.Generator, np.random.RandomState, np.random.BitGenerator, random.Random)
+FUNCTIONS = (types.ModuleType, types.FunctionType, types.BuiltinFunctionType, types.MethodType, type,
+             functools.partial, property, staticmethod, classmethod)
+
+
+class Step(NamedTuple):
+    """One step of the way to a value: the attribute of an object, or the item of a list or dictionary."""
+
+    key: Any
+    is_item: bool = False
+
+
+Path = tuple[Step, ...]
+
+
+def text_of(path: Path) -> str:
+    """Return a path as one writes it: `robot.arms[0].force`."""
+    parts = [f"[{step.key!r}]" if step.is_item else f".{step.key}" for step in path]
+    return "".join(parts).lstrip(".")
+
+
+class Owned(NamedTuple):
+    """The values that an environment owns, by path."""
+
+    plain: dict[Path, Any]
+    opaque: dict[Path, Any]
+    """What is neither plain nor an object with attributes: iterators, files, objects of compiled libraries."""
+    generators: dict[Path, Any]
+    owners: dict[Path, Any]
+    """The objects that have the attributes: the environment itself is at the empty path."""
+
+
+def look(root: Any) -> Owned:
+    """Return what `root`, below its wrappers, owns; each object once, at the first way that leads to it."""
+    root = bare(root)
+    owned = Owned({}, {}, {}, {(): root})
+    seen = {id(root)}
+    waiting: deque[tuple[Path, Any]] = deque([((), root)])
+    while waiting and len(seen) < MOST_OBJECTS:
+        path, owner = waiting.popleft()
+        for step, value in _inside(owner):
+            if not step.is_item and step.key in NOT_STATE and not isinstance(value, GENERATORS):
+                continue
+            where = (*path, step)
+            if is_plain(value):
+                owned.plain[where] = value
+            elif isinstance(value, GENERATORS):
+                owned.generators[where] = value
+            elif not _is_foreign(value) and id(value) not in seen:
+                seen.add(id(value))
+                if _has_inside(value) and len(where) < DEEPEST:
+                    owned.owners[where] = value
+                    waiting.append((where, value))
+                else:
+                    owned.opaque[where] = value
+    return owned
+
+
+def find(root: Any, path: Path) -> Any:
+    """Return the value at a path.
+
+    Raises:
+        AttributeError, LookupError: there is none.
+    """
+    root = bare(root)
+    for key, is_item in path:
+        root = root[key] if is_item else getattr(root, key)
+    return root
+
+
+def put(root: Any, path: Path, value: Any) -> None:
+    """Set the value at a path."""
+    owner, (key, is_item) = find(root, path[:-1]), path[-1]
+    if is_item:
+        owner[key] = value
+    else:
+        object.__setattr__(owner, key, value)
+
+
+def remove(root: Any, path: Path) -> None:
+    """Delete the value at a path, if there is one."""
+    owner, (key, is_item) = find(root, path[:-1]), path[-1]
+    if is_item:
+        owner.pop(key, None)
+    elif hasattr(owner, key):
+        object.__delattr__(owner, key)
+
+
+def _inside(owner: Any) -> Iterator[tuple[Step, Any]]:
+    if isinstance(owner, dict):
+        yield from ((Step(key, is_item=True), value) for key, value in list(owner.items()))
+    elif isinstance(owner, list | tuple | deque):
+        yield from ((Step(index, is_item=True), value) for index, value in enumerate(owner))
+    else:
+        yield from ((Step(name), value) for name, value in _attributes(owner))
+
+
+def _attributes(owner: Any) -> Iterator[tuple[str, Any]]:
+    yield from list(getattr(owner, "__dict__", {}).items())
+    for kind in type(owner).__mro__:
+        slots = vars(kind).get("__slots__", ())
+        for name in (slots,) if isinstance(slots, str) else slots:
+            if name not in ("__dict__", "__weakref__") and hasattr(owner, name):
+                yield name, getattr(owner, name)
+
+
+def _has_inside(value: Any) -> bool:
+    if isinstance(value, list | tuple | deque | dict):
+        return True
+    kind = type(value)
+    compiled = sys.modules.get(kind.__module__) is None or "__module__" not in vars(kind)
+    return not compiled and (hasattr(value, "__dict__") or any("__slots__" in vars(base) for base in kind.__mro__))
+
+
+def _is_foreign(value: Any) -> bool:
+    """Return whether a value is a function, or an object of a library that is no environment."""
+    if isinstance(value, FUNCTIONS):
+        return True
+    if isinstance(value, gymnasium.Env) or type(value).__name__ == "MjData":
+        return False
+    return type(value).__module__.partition(".")[0] in LIBRARIES

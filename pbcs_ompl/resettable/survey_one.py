@@ -1,0 +1,73 @@
+"""One environment of the survey, in this process: `python -m pbcs_ompl.resettable.survey_one MODULE:ID FILE`."""
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl.core.errors import InvalidOption, MissingDependency, NotResettable, UnsupportedSpace
+from pbcs_ompl.resettable.adapters.visited import VisitedEnv
+from pbcs_ompl.resettable.check import check_resettable
+from pbcs_ompl.resettable.make import make
+from pbcs_ompl.resettable.survey import Record, nothing
+from pbcs_ompl.results.files import write_json
+
+STATES = 20
+SECONDS = 0.5
+
+
+def classify(env_id: str) -> Record:
+    """Return what the survey says of an environment."""
+    began = time.perf_counter()
+    record = _classify(env_id)
+    return {**record, "seconds": round(time.perf_counter() - began, 1)}
+
+
+def _classify(env_id: str) -> Record:
+    try:
+        model: Any = make(env_id)
+    except MissingDependency as error:
+        return nothing("not installed", str(error))
+    except (NotResettable, UnsupportedSpace) as error:
+        return nothing("refused", str(error))
+    except InvalidOption as error:
+        return nothing("failed", str(error))
+    except ModuleNotFoundError as error:
+        return nothing("not installed", str(error))
+    except Exception as error:  # a foreign environment may raise anything: a finding of the survey
+        return nothing("failed", f"{type(error).__name__}: {error}")
+    report = check_resettable(model)
+    wrong = [check for check in report.checks if not check.ok]
+    visited = isinstance(model.env, VisitedEnv)
+    found = {"adapter": type(model.env).__name__, "state_size": len(model.state_low),
+             "restore_us": None if wrong else restore_cost(model)}
+    if wrong:
+        return {"verdict": "failed", "why": f"{wrong[0].name}: {wrong[0].detail}", **found}
+    return {"verdict": "visited only" if visited else "exact", "why": "", **found}
+
+
+def restore_cost(model: Any) -> float:
+    """Return the median microseconds of restoring one of the states of a short random walk."""
+    rng = np.random.default_rng(0)
+    states = [model.initial_state(0)]
+    for _ in range(STATES):
+        outcome = model.transition(states[-1][None], rng.uniform(model.action_low, model.action_high)[None])
+        if outcome.ended[0]:
+            break
+        states.append(outcome.states[0])
+    costs: list[float] = []
+    ends = time.perf_counter() + SECONDS
+    while len(costs) < len(states) or time.perf_counter() < ends:
+        state = states[int(rng.integers(len(states)))]
+        begun = time.perf_counter()
+        model.env.set_env_state(state)
+        costs.append(time.perf_counter() - begun)
+        if time.perf_counter() > ends:
+            break
+    return round(1e6 * float(np.median(costs)), 1)
+
+
+if __name__ == "__main__":
+    write_json(Path(sys.argv[2]), classify(sys.argv[1]))
