@@ -12,6 +12,7 @@ from typing import Any
 
 from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.cli.arguments import environment
+from pbcs_ompl.cli.busy import Busy
 from pbcs_ompl.cli.models import describe
 from pbcs_ompl.cli.terminal import print_summary
 from pbcs_ompl.core.errors import InvalidOption, PbcsError
@@ -132,8 +133,10 @@ def _environments() -> list[str]:
 def _check(arguments: Namespace) -> dict[str, Any]:
     from pbcs_ompl.resettable import check_resettable, make
 
-    model = make(environment(arguments))
-    report = check_resettable(model)
+    with Busy("pbcs doctor") as busy:
+        busy.stage("making the environment, finding out what its state is")
+        model = make(environment(arguments))
+        report = check_resettable(model, on_check=busy.stage)
     return {"env": report.env_id, "ok": report.ok, "checks": [asdict(check) for check in report.checks],
             **describe(model)}
 

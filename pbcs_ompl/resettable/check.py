@@ -82,7 +82,8 @@ class _Roll:
 def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
                      env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
                      feature: str | FeatureRule | None = None, start_seed: int | None = None,
-                     reset_options: dict[str, Any] | None = None, seed: int = 0) -> ResetReport:
+                     reset_options: dict[str, Any] | None = None, seed: int = 0,
+                     on_check: Callable[[str], None] | None = None) -> ResetReport:
     """Check that an environment continues from a restored state as it did before, bit for bit.
 
     What is wrong with an environment is in the report; what is wrong with the arguments is raised.
@@ -91,6 +92,7 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
         env, env_kwargs, goal, feature, start_seed, reset_options: See `pbcs_ompl.make`. An environment that is given is
             moved about.
         seed: Seed of the actions and states that are tried.
+        on_check: Gets the name of each check before it runs.
 
     Raises:
         UnknownName, InvalidOption, MissingDependency: see `pbcs_ompl.make`.
@@ -122,10 +124,12 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
     ]
     if "arbitrary" in model.capabilities:
         tests.append(("valid states within the bounds come back as set", trial.arbitrary))
-    return ResetReport(model.spec.id, tuple(_run(name, test) for name, test in tests))
+    return ResetReport(model.spec.id, tuple(_run(name, test, on_check) for name, test in tests))
 
 
-def _run(name: str, test: Callable[[], str]) -> Check:
+def _run(name: str, test: Callable[[], str], on_check: Callable[[str], None] | None) -> Check:
+    if on_check is not None:
+        on_check(name)
     try:
         found = test()
     except Exception as error:  # an author's mistake is a finding, not a crash

@@ -1,4 +1,4 @@
-"""Restored states continue as fresh instances do; an instance with a past is told from a random one."""
+"""Restored states continue as fresh instances do; an instance with a past is not called random."""
 
 from typing import Any
 

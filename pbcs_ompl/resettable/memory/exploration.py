@@ -153,7 +153,7 @@ def refuse_opaque(env: Any, path: Path, value: Any) -> None:
 def fingerprint(value: Any) -> Any:
     """Return what changes if an opaque value does; None where that cannot be seen, and it can only change."""
     if isinstance(value, io.IOBase):
-        return value.tell() if not value.closed and value.readable() and value.seekable() else id(value)
+        return value.seek(0, io.SEEK_CUR) if not value.closed and value.readable() and value.seekable() else id(value)
     if hasattr(value, "qpos") and hasattr(value, "time"):  # a simulation of MuJoCo
         return value.time, value.qpos.tobytes()
     return None if hasattr(value, "__next__") else id(value)
