@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.errors import NotVerified, PbcsError
 from pbcs_ompl.core.interfaces import ResettableModel
-from pbcs_ompl.resettable.adapt import adapt_without_copy
+from pbcs_ompl.resettable.adapt import second_model
 from pbcs_ompl.resettable.fresh import close
 from pbcs_ompl.resettable.judge import Execution, Judge
 from pbcs_ompl.resettable.model import Model
@@ -67,11 +67,8 @@ def _first_difference(trajectory: Trajectory, model: ResettableModel) -> int | N
     """
     if not isinstance(model, Model) or model.make_env is None:
         return trajectory.first_difference(model)
-    env = model.make_env()
+    second = second_model(model)
     try:
-        second = adapt_without_copy(env, goal=model.spec.goal, feature=model.spec.feature,
-                                    reset_options=model.spec.reset_options)
-        second.spec = model.spec
         return trajectory.first_difference(second)
     finally:
-        close(env)
+        close(second.env)

@@ -12,6 +12,7 @@ from typing import Any
 
 from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.cli.arguments import environment
+from pbcs_ompl.cli.busy import Busy
 from pbcs_ompl.cli.models import describe
 from pbcs_ompl.cli.terminal import print_summary
 from pbcs_ompl.core.errors import InvalidOption, PbcsError
@@ -28,6 +29,9 @@ def run(arguments: Namespace) -> int:
     """Look, change nothing. Returns 3 when a needed library is missing, 1 when the environment fails."""
     if arguments.all:
         return _run_survey(arguments)
+    for name in ("out", "max_seconds"):
+        if getattr(arguments, name) is not None:
+            raise InvalidOption(f"--{name.replace('_', '-')} goes with --all")
     versions = {"python": python_version(), **{name: _version(name) for name in NEEDED + OPTIONAL}}
     missing = [name for name in NEEDED if versions[name] is None]
     result: dict[str, Any] = {
@@ -44,20 +48,20 @@ def run(arguments: Namespace) -> int:
 
 def _run_survey(arguments: Namespace) -> int:
     """Check all environments, and write the page."""
-    from pbcs_ompl.resettable.survey import VERDICTS, Record, registered, survey
+    from pbcs_ompl.resettable.survey import TIME_OUT, VERDICTS, Record, registered, survey
     from pbcs_ompl.resettable.survey_page import survey_page
 
     if arguments.env is not None:
         raise InvalidOption("--all checks every environment; leave out --env")
     out = Path(arguments.out or SURVEY)
-    ids = registered()
+    ids, limit = registered(), arguments.max_seconds or TIME_OUT
 
     def show(record: Record, done: int) -> None:
         print(f"{done}/{len(ids)} {record['id']}: {record['verdict']} {record['why']}".rstrip(), file=sys.stderr)
 
-    records = survey(ids, out / "environments.json", seconds=arguments.max_seconds, on_record=show)
+    records = survey(ids, out / "environments.json", seconds=limit, on_record=show)
     page = out / "environments.md"
-    write_text(page, survey_page(records, command(["doctor", "--all"]), arguments.max_seconds))
+    write_text(page, survey_page(records, command(["doctor", "--all"]), limit))
     counts = {verdict: sum(record["verdict"] == verdict for record in records) for verdict in VERDICTS}
     lines = [("", f"{count} {verdict}") for verdict, count in counts.items()]
     print_summary({"verdicts": counts, "page": str(page)}, [*lines, ("page", str(page))], as_json=arguments.json)
@@ -132,8 +136,10 @@ def _environments() -> list[str]:
 def _check(arguments: Namespace) -> dict[str, Any]:
     from pbcs_ompl.resettable import check_resettable, make
 
-    model = make(environment(arguments))
-    report = check_resettable(model)
+    with Busy("pbcs doctor") as busy:
+        busy.stage("making the environment, finding out what its state is")
+        model = make(environment(arguments))
+        report = check_resettable(model, on_check=busy.stage)
     return {"env": report.env_id, "ok": report.ok, "checks": [asdict(check) for check in report.checks],
             **describe(model)}
 

@@ -6,9 +6,8 @@ from typing import Any, cast
 
 import gymnasium
 
-from pbcs_ompl.core.callbacks import callback_failed
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import InvalidOption, NotResettable, PbcsError
+from pbcs_ompl.core.errors import InvalidOption, NotResettable, NotVerified
 from pbcs_ompl.core.interfaces import GetSetEnv, ResettableModel, VectorisedEnv
 from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.resettable.adapters.classic import VectorEnv
@@ -22,7 +21,7 @@ from pbcs_ompl.resettable.families import proved, restorable
 from pbcs_ompl.resettable.fresh import EnvMaker, episode_limit, fresh_maker
 from pbcs_ompl.resettable.memory.uncovered import refuse_uncovered
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
-from pbcs_ompl.resettable.supported import task_env
+from pbcs_ompl.resettable.supported import TaskMaker, task_env, task_maker
 from pbcs_ompl.resettable.task_env import bare
 
 MODEL_MEMBERS = {*ResettableModel.__annotations__, *(n for n in vars(ResettableModel) if not n.startswith("_"))}
@@ -48,7 +47,6 @@ def adapt(env: Any, *, goal: str | GoalRule | None = None, feature: str | Featur
         NotResettable: its states cannot be restored, or a wrapper may have a memory; says what to implement.
         UnsupportedSpace: its actions are no finite vector, or its observations no vectors of numbers.
         InvalidOption: a rule does not parse, or does not fit the environment.
-        CallbackFailed: the environment raised when it was reset or stepped.
     """
     if not isinstance(env, gymnasium.Env):
         return adapt_without_copy(env, goal=goal, feature=feature)
@@ -65,19 +63,31 @@ def adapt_without_copy(env: Any, *, goal: str | GoalRule | None = None, feature:
             raise InvalidOption("a goal or feature can be given to a gymnasium.Env only, not to its adapted model")
         return _as_model(env)
     limit = episode_limit(env)
-    try:
-        model = _choose(task_env(env, reset_options), goal, feature, make_env)
-    except (PbcsError, ImportError):
-        raise
-    except Exception as error:  # whatever the environment raises when it is reset and stepped
-        raise callback_failed(error, "the environment") from error
+    model = _choose(task_env(env, reset_options), goal, feature, task_maker(make_env, reset_options))
     model.make_env = make_env
     if limit is not None:
         model.episode_limit = model.max_episode_steps = limit
     return model
 
 
-def _choose(inner: Any, goal: Any, feature: Any, make_env: EnvMaker | None) -> ResettableModel:
+def second_model(model: ResettableModel) -> ResettableModel:
+    """Return a model of a fresh environment of the task of `model`, which nothing has run in.
+
+    Raises:
+        NotVerified: no fresh environment can be made.
+    """
+    make_inner = task_maker(model.make_env, model.spec.reset_options)
+    if make_inner is None or model.make_env is None:
+        raise NotVerified(f"no fresh environment of {model.spec.id} can be made")
+    if isinstance(model.env, RestorableEnv):
+        second = _model_of(model.env.again(make_inner()))
+    else:
+        second = adapt_without_copy(model.make_env(), reset_options=model.spec.reset_options)
+    second.spec, second.make_env = model.spec, model.make_env
+    return second
+
+
+def _choose(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None) -> ResettableModel:
     if isinstance(inner, RestorableEnv):
         return _model_of(inner)
     if isinstance(inner, SuccessFlagEnv):
@@ -88,20 +98,18 @@ def _choose(inner: Any, goal: Any, feature: Any, make_env: EnvMaker | None) -> R
     if isinstance(inner, VectorisedEnv) and not ruled:
         return _as_model(VectorisedModel(inner))
     if isinstance(inner, GetSetEnv) and not (is_mujoco_env(inner) and not _is_vector(inner)):
-        return _get_set(inner, goal, feature, make_env)
-    return _model_of(restorable(inner, goal, feature, make_env))
+        return _get_set(inner, goal, feature, make_inner)
+    return _model_of(restorable(inner, goal, feature, make_inner))
 
 
-
-
-def _get_set(inner: Any, goal: Any, feature: Any, make_env: EnvMaker | None) -> ResettableModel:
+def _get_set(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None) -> ResettableModel:
     if goal is not None or feature is not None:
         refuse_uncovered(inner)
-        return _model_of(proved(VectorEnv(inner, goal, feature), make_env))
+        return _model_of(proved(VectorEnv(inner, goal, feature), make_inner))
     offers = EnvAttributes.of(inner)
     model = GetSetStateModel(inner if offers.goal_distance is not None else SuccessFlagEnv(inner, offers))
     refuse_uncovered(inner)
-    proved(model.env, make_env)
+    proved(model.env, make_inner)
     if offers.goal_distance is not None:
         return _as_model(model)
     if inner.spec is None:

@@ -14,11 +14,9 @@ from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap, copied
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
-from pbcs_ompl.resettable.fresh import EnvMaker
 from pbcs_ompl.resettable.observations import flat
-from pbcs_ompl.resettable.rules import Outcome, reported_success
-from pbcs_ompl.resettable.supported import task_env
-from pbcs_ompl.resettable.task_env import TaskEnv
+from pbcs_ompl.resettable.rules import Outcome
+from pbcs_ompl.resettable.supported import TaskMaker
 
 SHORT, LONG = 12, 60
 """Steps of a sequence."""
@@ -49,40 +47,39 @@ class Moment(NamedTuple):
         return ""
 
 
-def first_difference(env: Any, make_env: EnvMaker, *, steps: int = SHORT, seed: int = 0) -> str:
+def first_difference(env: Any, make_inner: TaskMaker, *, steps: int = SHORT, seed: int = 0) -> str:
     """Return what differs first between restored states and fresh instances, with its place; empty if nothing does.
 
     Args:
         env: An environment with `get_env_state` and `set_env_state`, adapted or an author's own. It is moved about.
-        make_env: Makes fresh instances of it.
+        make_inner: Makes fresh instances of it.
         steps: The length of the sequences.
         seed: Of resets and actions.
     """
     rng = np.random.default_rng(seed)
     one, two = _sequence(env, rng, steps), _sequence(env, rng, steps)
-    return _Branching(env, seed, one, fresh_episode(env, make_env, seed, one), two,
-                      fresh_episode(env, make_env, seed, two), _sequence(env, rng, 3 * steps)).first_difference()
+    return _Branching(env, seed, one, fresh_episode(env, make_inner, seed, one), two,
+                      fresh_episode(env, make_inner, seed, two), _sequence(env, rng, 3 * steps)).first_difference()
 
 
-def fresh_difference(env: Any, make_env: EnvMaker, *, steps: int = LONG, seed: int = 0) -> str:
+def fresh_difference(env: Any, make_inner: TaskMaker, *, steps: int = LONG, seed: int = 0) -> str:
     """Return what differs first between two fresh instances that do the same, or an empty string."""
     actions = _sequence(env, np.random.default_rng(seed), steps)
-    one, two = (fresh_episode(env, make_env, seed, actions) for _ in range(2))
+    one, two = (fresh_episode(env, make_inner, seed, actions) for _ in range(2))
     return next((f"{found} at step {step}" for step, (mine, theirs) in enumerate(zip(one, two, strict=False))
                  if (found := mine.difference(theirs))), "" if len(one) == len(two) else f"the end at step {len(one)}")
 
 
-def fresh_episode(env: Any, make_env: EnvMaker, seed: int, actions: list[Any]) -> list[Moment]:
+def fresh_episode(env: Any, make_inner: TaskMaker, seed: int, actions: list[Any]) -> list[Moment]:
     """Return the moments of an episode in a fresh instance, from the reset to its end or that of the actions.
 
     Args:
         env: The environment that is tested, which says what is a success and a part of the state.
-        make_env: Makes the instance.
+        make_inner: Makes the instance.
         seed: Of its reset.
         actions: What it is given.
     """
-    fresh = make_env()
-    inner: Any = task_env(fresh, _reset_options(env))
+    inner = make_inner()
     try:
         observation, _ = inner.reset(seed=seed)
         moments = [Moment(_named_state(env, inner), flat(observation))]
@@ -94,7 +91,7 @@ def fresh_episode(env: Any, make_env: EnvMaker, seed: int, actions: list[Any]) -
             moments.append(Moment(_named_state(env, inner), flat(observation), float(reward), bool(terminated),
                                   bool(truncated), _success(env, outcome)))
     finally:
-        fresh.close()
+        inner.close()
     return moments
 
 
@@ -151,12 +148,17 @@ class _Branching:
             yield "" if index is None else f"state{index} at step {step} of single steps, each from a restored state"
 
     def _observed(self, states: list[Array]) -> Iterator[str]:
-        """Compare the observations of restored states."""
-        if not hasattr(self._env, "observe"):
+        """Compare the observations of restored states; those that an author computes, in float32 or a shorter type."""
+        observe = state_observer(self._env, EnvAttributes.of(self._env))
+        if observe is None:
             return
-        rows = self._env.observe(np.array(states))
+        kind = np.dtype(np.float64 if isinstance(self._env, RestorableEnv) else np.float32)
+        space = self._env.observation_space
+        if isinstance(self._env, SuccessFlagEnv) and space.dtype is not None and space.dtype.kind == "f":
+            kind = min(kind, space.dtype, key=lambda dtype: dtype.itemsize)
+        rows = observe(np.array(states))
         for step, (row, moment) in enumerate(zip(rows, self._one[1], strict=False)):
-            index = _first_index(moment.observation, flat(row))
+            index = _first_index(moment.observation.astype(kind), flat(row).astype(kind))
             yield f"observation{index} of the restored state of step {step}" if index is not None else ""
 
     def _steps(self, sequence: tuple[list[Any], list[Moment]], at: int, states: list[Array],
@@ -195,11 +197,6 @@ def _sequence(env: Any, rng: np.random.Generator, steps: int) -> list[Any]:
     return list(actions.to_actions(np.repeat(controls, HELD, axis=0)[:steps]))
 
 
-def _reset_options(env: Any) -> dict[str, Any] | None:
-    inner = env.inner if isinstance(env, RestorableEnv | SuccessFlagEnv) else env
-    return inner.reset_options if isinstance(inner, TaskEnv) else None
-
-
 def _named_state(env: Any, inner: Any) -> dict[str, Any]:
     if isinstance(env, RestorableEnv):
         named: dict[str, Any] = {name: _kept(value) for name, value in env.named_state(inner).items()}
@@ -214,7 +211,7 @@ def _kept(value: Any) -> Any:
 def _success(env: Any, outcome: Outcome) -> bool:
     if isinstance(env, RestorableEnv):
         return env.is_success(outcome)
-    return reported_success(outcome)
+    return bool(outcome.info.get("is_success", outcome.info.get("success", outcome.terminated)))
 
 
 def _first_index(one: Any, other: Any) -> str | None:

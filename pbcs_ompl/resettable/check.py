@@ -23,6 +23,7 @@ from pbcs_ompl.resettable.attributes import misspelt
 from pbcs_ompl.resettable.branching import LONG, first_difference
 from pbcs_ompl.resettable.make import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.resettable.supported import task_maker
 
 STEPS = 30
 
@@ -81,7 +82,8 @@ class _Roll:
 def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
                      env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
                      feature: str | FeatureRule | None = None, start_seed: int | None = None,
-                     reset_options: dict[str, Any] | None = None, seed: int = 0) -> ResetReport:
+                     reset_options: dict[str, Any] | None = None, seed: int = 0,
+                     on_check: Callable[[str], None] | None = None) -> ResetReport:
     """Check that an environment continues from a restored state as it did before, bit for bit.
 
     What is wrong with an environment is in the report; what is wrong with the arguments is raised.
@@ -90,6 +92,7 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
         env, env_kwargs, goal, feature, start_seed, reset_options: See `pbcs_ompl.make`. An environment that is given is
             moved about.
         seed: Seed of the actions and states that are tried.
+        on_check: Gets the name of each check before it runs.
 
     Raises:
         UnknownName, InvalidOption, MissingDependency: see `pbcs_ompl.make`.
@@ -121,10 +124,12 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
     ]
     if "arbitrary" in model.capabilities:
         tests.append(("valid states within the bounds come back as set", trial.arbitrary))
-    return ResetReport(model.spec.id, tuple(_run(name, test) for name, test in tests))
+    return ResetReport(model.spec.id, tuple(_run(name, test, on_check) for name, test in tests))
 
 
-def _run(name: str, test: Callable[[], str]) -> Check:
+def _run(name: str, test: Callable[[], str], on_check: Callable[[str], None] | None) -> Check:
+    if on_check is not None:
+        on_check(name)
     try:
         found = test()
     except Exception as error:  # an author's mistake is a finding, not a crash
@@ -171,7 +176,7 @@ class _Trial:
 
     def elsewhere(self) -> str:
         other = self._second()
-        other.reset(seed=54321)
+        other.reset(seed=54321, options=self.model.spec.reset_options)
         found = self.first.difference(self.roll(other, self.start))
         other.close()
         return found
@@ -186,9 +191,10 @@ class _Trial:
                          reset_options=spec.reset_options).env
 
     def branches(self) -> str:
-        if self.model.make_env is None:
+        make_inner = task_maker(self.model.make_env, self.model.spec.reset_options)
+        if make_inner is None:
             return ""
-        return first_difference(self.env, self.model.make_env, steps=LONG, seed=self.seed + 1)
+        return first_difference(self.env, make_inner, steps=LONG, seed=self.seed + 1)
 
     def spelling(self) -> str:
         return "; ".join(f"{name!r} is not read; did you mean {meant!r}?"

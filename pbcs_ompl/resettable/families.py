@@ -9,7 +9,8 @@ from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, check_observes, is_m
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.visited import CopiedEnv, FreshEnv, ReplayedEnv, copies_are_faithful, replays
 from pbcs_ompl.resettable.branching import first_difference, fresh_difference
-from pbcs_ompl.resettable.fresh import EnvMaker
+from pbcs_ompl.resettable.supported import TaskMaker
+from pbcs_ompl.resettable.task_env import bare
 
 HOW_TO = (
     "implement `get_env_state() -> array [D]` and `set_env_state(array)` beside `step` (simple), or the "
@@ -18,7 +19,7 @@ HOW_TO = (
 Provable = TypeVar("Provable")
 
 
-def restorable(inner: Any, goal: Any, feature: Any, make_env: EnvMaker | None) -> RestorableEnv:
+def restorable(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None) -> RestorableEnv:
     """Return an environment as its family restores it.
 
     MuJoCo, classic control, deep copies, replayed actions, and these in fresh instances: the first that fits, and whose
@@ -27,54 +28,55 @@ def restorable(inner: Any, goal: Any, feature: Any, make_env: EnvMaker | None) -
     Args:
         inner: The environment without wrappers.
         goal, feature: Rules; see `RestorableEnv`.
-        make_env: Makes fresh instances; None where none can be made, and nothing is proved.
+        make_inner: Makes fresh instances; None where none can be made, and nothing is proved.
 
     Raises:
         NotResettable: none does; says what differs.
     """
     if is_mujoco_env(inner):
         check_observes(inner)
-        return proved(MujocoEnv(inner, goal, feature), make_env)
+        return proved(MujocoEnv(inner, goal, feature), make_inner)
     if has_state_attribute(inner):
-        return proved(AttributeEnv(inner, goal, feature), make_env)
+        return proved(AttributeEnv(inner, goal, feature), make_inner)
     if replays(inner):
-        if copies_are_faithful(inner) and not _difference(env := CopiedEnv(inner, goal, feature), make_env):
+        apart = inner if make_inner is None else make_inner()  # the copies of some physics servers close the original
+        if copies_are_faithful(apart) and not _difference(env := CopiedEnv(inner, goal, feature), make_inner):
             return env
-        if not _difference(replayed := ReplayedEnv(inner, goal, feature), make_env):
+        if not _difference(replayed := ReplayedEnv(inner, goal, feature), make_inner):
             _warn(f"{_name(inner)} is restored by replaying its actions, which is slow: {HOW_TO}")
             return replayed
-    if make_env is None:
+    if make_inner is None:
         raise NotResettable(f"{_name(inner)} is not resettable: the same actions from the same seed lead elsewhere in "
                             f"an instance that has run before, and no fresh one can be made; {HOW_TO}")
-    return _fresh(inner, goal, feature, make_env)
+    return _fresh(inner, goal, feature, make_inner)
 
 
-def proved(env: Provable, make_env: EnvMaker | None) -> Provable:
+def proved(env: Provable, make_inner: TaskMaker | None) -> Provable:
     """Return `env`, if its restored states continue as fresh instances do.
 
     Args:
         env: An environment with `get_env_state` and `set_env_state`, adapted or an author's own.
-        make_env: Makes fresh instances; None to prove nothing.
+        make_inner: Makes fresh instances; None to prove nothing.
 
     Raises:
         NotResettable: says what differs first, or that steps are random.
     """
-    found = _difference(env, make_env)
+    found = _difference(env, make_inner)
     if not found:
         return env
-    assert make_env is not None
+    assert make_inner is not None
     inner: Any = getattr(env, "inner", env)
-    if random := fresh_difference(env, make_env):
+    if random := fresh_difference(env, make_inner):
         raise NotResettable(_random(inner, random))
     raise NotResettable(f"{_name(inner)} is not resettable: a restored state does not continue as a fresh instance "
                         f"does; it differs in {found}; {HOW_TO}")
 
 
-def _fresh(inner: Any, goal: Any, feature: Any, make_env: EnvMaker) -> RestorableEnv:
-    env = FreshEnv(inner, goal, feature, make_env=make_env)
-    if random := fresh_difference(env, make_env):
+def _fresh(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker) -> RestorableEnv:
+    env = FreshEnv(inner, goal, feature, make_inner=make_inner)
+    if random := fresh_difference(env, make_inner):
         raise NotResettable(_random(inner, random))
-    if found := first_difference(env, make_env):
+    if found := first_difference(env, make_inner):
         raise NotResettable(f"{_name(inner)} is not resettable: replayed in a fresh instance, it differs in {found}; "
                             f"{HOW_TO}")
     _warn(f"{_name(inner)} does not do the same after a reset as a fresh instance does; it is restored by making a "
@@ -82,8 +84,8 @@ def _fresh(inner: Any, goal: Any, feature: Any, make_env: EnvMaker) -> Restorabl
     return env
 
 
-def _difference(env: Any, make_env: EnvMaker | None) -> str:
-    return "" if make_env is None else first_difference(env, make_env)
+def _difference(env: Any, make_inner: TaskMaker | None) -> str:
+    return "" if make_inner is None else first_difference(env, make_inner)
 
 
 def _random(inner: Any, found: str) -> str:
@@ -96,4 +98,4 @@ def _warn(text: str) -> None:
 
 
 def _name(env: Any) -> str:
-    return env.spec.id if getattr(env, "spec", None) is not None else type(env).__name__
+    return env.spec.id if getattr(env, "spec", None) is not None else type(bare(env)).__name__

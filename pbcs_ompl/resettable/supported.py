@@ -1,5 +1,6 @@
 """What the toolkit can work with: observations that are vectors of numbers, wrappers that only transform."""
 
+from collections.abc import Callable
 from copy import copy
 from typing import Any
 
@@ -9,10 +10,13 @@ from gymnasium import spaces
 
 from pbcs_ompl.core.errors import NotResettable, UnsupportedSpace
 from pbcs_ompl.core.interfaces import GetSetEnv
+from pbcs_ompl.resettable.fresh import EnvMaker
 from pbcs_ompl.resettable.observations import parts
 from pbcs_ompl.resettable.pure import check_pure
 from pbcs_ompl.resettable.task_env import Kept, TaskEnv
 
+TaskMaker = Callable[[], Any]
+"""Makes fresh instances of what adapters work on: what `task_env` makes of fresh environments."""
 NUMBERS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
 DROPPED = frozenset({"TimeLimit", "PassiveEnvChecker", "OrderEnforcing", "Autoreset", "RecordEpisodeStatistics",
                      "RecordVideo", "HumanRendering", "RenderCollection"})
@@ -83,6 +87,11 @@ def task_env(env: gymnasium.Env[Any, Any], reset_options: dict[str, Any] | None 
     task = TaskEnv(top, tuple(layers), within, env.spec, reset_options=reset_options, flatten=flatten)
     check_pure(task)
     return task
+
+
+def task_maker(make_env: EnvMaker | None, reset_options: dict[str, Any] | None = None) -> TaskMaker | None:
+    """Return what makes fresh instances of what adapters work on, from what makes the environment with its wrappers."""
+    return None if make_env is None else lambda: task_env(make_env(), reset_options)
 
 
 def _restores(env: Any) -> bool:

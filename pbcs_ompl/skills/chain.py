@@ -162,13 +162,12 @@ class SkillChain:
         for index, skill in enumerate(self.skills):
             arrays |= to_arrays(skill.activation, f"activation{index}") | to_arrays(skill.target, f"target{index}")
             arrays |= entry_to_arrays(skill.entry, f"entry{index}")
-        seed = {} if self.reset_seed is None else {"reset_seed": self.reset_seed}
-        write_chain(Path(folder), {
-            "environment": self.environment.to_dict(), "time_limit": self.time_limit, **seed,
+        structure = {
+            "environment": self.environment.to_dict(), "time_limit": self.time_limit, "reset_seed": self.reset_seed,
             "action_shape": list(self.actions.shape),
             "skills": [{"activation": kind_of(skill.activation), "target": kind_of(skill.target),
-                        "entry": entry_kinds(skill.entry)} for skill in self.skills],
-        }, arrays, [skill.policy for skill in self.skills])
+                        "entry": entry_kinds(skill.entry)} for skill in self.skills]}
+        write_chain(Path(folder), structure, arrays, [skill.policy for skill in self.skills])
 
     @classmethod
     @checked
@@ -191,8 +190,7 @@ class SkillChain:
                       entry_from_arrays(entry["entry"], arrays, f"entry{index}"))
                 for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
             actions = ActionMap(arrays["first_action"], arrays["last_action"], tuple(structure["action_shape"]))
-            environment = EnvSpec.from_dict(structure["environment"], trusted=trust)
-            return cls(skills, arrays["start"], environment, structure["time_limit"], actions,
-                       structure.get("reset_seed"))
+            return cls(skills, arrays["start"], EnvSpec.from_dict(structure["environment"], trusted=trust),
+                       structure["time_limit"], actions, structure["reset_seed"])
         except (KeyError, ValueError, TypeError, IndexError) as error:
             raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error

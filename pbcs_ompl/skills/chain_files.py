@@ -9,7 +9,7 @@ import json
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NotRequired, TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -39,8 +39,8 @@ class ChainWords(TypedDict):
 
     environment: EnvValues
     time_limit: Positive
-    reset_seed: NotRequired[Count]
-    action_shape: list[Positive]
+    reset_seed: Count | None
+    action_shape: list[Count]
     skills: list[SkillWords]
     sha256: dict[str, str]
 

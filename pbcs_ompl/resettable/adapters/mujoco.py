@@ -65,6 +65,10 @@ class MujocoEnv(RestorableEnv):
             return feature_rule("achieved_goal")
         return feature_rule("qpos[0:2]" if self.inner.model.nq > 1 else "qpos[0]")
 
+    def attach(self) -> None:
+        """Let the memory refer to `inner`."""
+        self._memory = self._memory.of(self.inner)
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         """Reset the environment as if nothing had run in it before."""
         self._memory.clear()
@@ -169,8 +173,7 @@ class MujocoModel(GetSetStateModel):
     def _open_pool(self) -> None:
         assert self.make_env is not None
         for _ in range(self._threads - 1):
-            inner = task_env(self.make_env(), self.spec.reset_options)
-            self._others.append(MujocoEnv(inner, self.env.goal_rule, self.env.feature_rule))
+            self._others.append(self.env.again(task_env(self.make_env(), self.spec.reset_options)))
         self._pool = ThreadPoolExecutor(self._threads - 1, thread_name_prefix="mujoco")
 
 

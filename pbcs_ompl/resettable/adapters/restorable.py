@@ -3,7 +3,8 @@
 import math
 import warnings
 from abc import ABC, abstractmethod
-from typing import Any
+from copy import copy
+from typing import Any, Self
 
 import gymnasium
 import numpy as np
@@ -75,6 +76,17 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.state_low = np.concatenate([self.bounds.low, -rest])
         self.state_high = np.concatenate([self.bounds.high, rest])
         self.reset(seed=0)
+
+    def again(self, inner: Any) -> Self:
+        """Return the adapter of another instance of the environment, without exploring that one."""
+        other = copy(self)
+        other.inner = inner
+        other.attach()
+        other.reset(seed=0)
+        return other
+
+    def attach(self) -> None:
+        """Let what refers to the environment refer to `inner`."""
 
     @abstractmethod
     def save(self) -> Array:

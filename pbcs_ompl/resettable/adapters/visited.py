@@ -9,6 +9,7 @@ and a trajectory found here can be replayed elsewhere.
 
 import struct
 from abc import abstractmethod
+from collections.abc import Callable
 from copy import deepcopy
 from hashlib import blake2b
 from typing import Any
@@ -19,10 +20,7 @@ from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap, copied
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
-from pbcs_ompl.resettable.fresh import EnvMaker
 from pbcs_ompl.resettable.observations import flat
-from pbcs_ompl.resettable.supported import task_env
-from pbcs_ompl.resettable.task_env import TaskEnv
 
 FIRST_HASH = float(2**32)
 """Smaller numbers are seeds."""
@@ -36,6 +34,10 @@ class VisitedEnv(RestorableEnv):
         self._name = 0.0
         self._observations: dict[float, Array] = {}
         super().__init__(inner, goal, feature)
+
+    def attach(self) -> None:
+        """Begin with nothing visited."""
+        self._observations = {}
 
     def save(self) -> Array:
         """Return the name [1] of the present state."""
@@ -67,7 +69,8 @@ class VisitedEnv(RestorableEnv):
         seed = int(np.random.default_rng().integers(2**32)) if seed is None else seed
         observation, info = super().reset(seed=seed, options=options)
         self._name = float(seed)
-        self._keep(flat(observation), None, None)
+        self._observations[self._name] = flat(observation)
+        self.keep(self._name, None, None)
         return observation, info
 
     def step(self, action: Array) -> Any:
@@ -75,14 +78,9 @@ class VisitedEnv(RestorableEnv):
         before, action = self._name, copied(action)
         outcome = super().step(action)
         self._name = child_hash(before, action)
-        self._keep(flat(outcome[0]), before, action)
+        self._observations[self._name] = flat(outcome[0])
+        self.keep(self._name, before, action)
         return outcome
-
-    def _keep(self, observation: Array, before: float | None, action: Array | None) -> None:
-        """Keep what the present state is found again by; not of the steps that only show the range of the feature."""
-        if not self.exploring:
-            self._observations[self._name] = observation
-            self.keep(self._name, before, action)
 
     @abstractmethod
     def keep(self, name: float, before: float | None, action: Array | None) -> None:
@@ -103,6 +101,11 @@ class CopiedEnv(VisitedEnv):
         self._copies: dict[float, Any] = {}
         super().__init__(inner, goal, feature)
 
+    def attach(self) -> None:
+        """Begin with nothing visited."""
+        super().attach()
+        self._copies = {}
+
     def keep(self, name: float, before: float | None, action: Array | None) -> None:
         """Copy the environment."""
         if name not in self._copies:
@@ -122,6 +125,11 @@ class ReplayedEnv(VisitedEnv):
     def __init__(self, inner: Any, goal: Any = None, feature: Any = None):
         self._actions: dict[float, tuple[float, Array] | None] = {}
         super().__init__(inner, goal, feature)
+
+    def attach(self) -> None:
+        """Begin with nothing visited."""
+        super().attach()
+        self._actions = {}
 
     def keep(self, name: float, before: float | None, action: Array | None) -> None:
         """Store the action that led here."""
@@ -150,14 +158,18 @@ class FreshEnv(ReplayedEnv):
     Args:
         inner: The environment without wrappers.
         goal, feature: See `RestorableEnv`.
-        make_env: Makes fresh instances.
+        make_inner: Makes fresh instances.
     """
 
-    def __init__(self, inner: Any, goal: Any = None, feature: Any = None, *, make_env: EnvMaker):
-        self._make_env = make_env
-        self._reset_options = inner.reset_options if isinstance(inner, TaskEnv) else None
+    def __init__(self, inner: Any, goal: Any = None, feature: Any = None, *, make_inner: Callable[[], Any]):
+        self._make_inner = make_inner
         self._made: Any = None
         super().__init__(inner, goal, feature)
+
+    def attach(self) -> None:
+        """Begin with nothing visited."""
+        super().attach()
+        self._made = self.inner
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         """Reset a fresh instance."""
@@ -168,8 +180,7 @@ class FreshEnv(ReplayedEnv):
         """Replace the instance."""
         if self._made is not None:
             self._made.close()
-        self._made = self._make_env()
-        self.inner = task_env(self._made, self._reset_options)
+        self._made = self.inner = self._make_inner()
 
 
 def child_hash(name: float, action: Array) -> float:

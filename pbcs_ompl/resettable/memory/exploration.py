@@ -14,6 +14,7 @@ from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.resettable.memory.generators import drawn, states
 from pbcs_ompl.resettable.memory.owned import Owned, Path, look, text_of
 from pbcs_ompl.resettable.memory.plain_values import is_plain, same, to_text
+from pbcs_ompl.resettable.task_env import bare
 
 SEEDS = (0, 1, 2, 0)
 STEPS = 40
@@ -59,8 +60,8 @@ class Changes:
     """What of an environment has changed, by path; `add` after every reset and step."""
 
     def __init__(self, env: Any):
-        self._env = env
-        self.owned: Owned = look(env)
+        self._env = bare(env)
+        self.owned: Owned = look(self._env)
         self._generators = states(self.owned.generators)
         self.plain = {path: Seen(value) for path, value in self.owned.plain.items()}
         self._opaque = {path: (value, fingerprint(value)) for path, value in self.owned.opaque.items()}
@@ -103,7 +104,7 @@ def _first_names(plain: dict[Path, Any]) -> dict[Path, Path]:
 
 def plain_copies(env: Any) -> dict[Path, Any]:
     """Return copies of the plain values that an environment owns, by path."""
-    return {path: deepcopy(value) for path, value in look(env).plain.items()}
+    return {path: deepcopy(value) for path, value in look(bare(env)).plain.items()}
 
 
 def episodes(env: gymnasium.Env[Any, Any], seeds: tuple[int, ...] = SEEDS, steps: int = STEPS) -> Iterator[Event]:
@@ -134,7 +135,7 @@ def refuse_random(env: Any, changes: Changes) -> None:
         NotResettable: they do.
     """
     if changes.random:
-        raise NotResettable(f"{type(env).__name__} is not resettable: its steps draw random numbers from "
+        raise NotResettable(f"{type(bare(env)).__name__} is not resettable: its steps draw random numbers from "
                             f"{changes.random}; make the randomness part of its state, or draw all of it in reset")
 
 
@@ -144,15 +145,15 @@ def refuse_opaque(env: Any, path: Path, value: Any) -> None:
     Raises:
         NotResettable: always.
     """
-    raise NotResettable(f"{type(env).__name__} is not resettable: it keeps a {type(value).__name__} in its attribute "
-                        f"{text_of(path)!r}, which changes and cannot be saved; keep numbers, arrays, flags, or lists "
-                        f"and dictionaries of them instead")
+    raise NotResettable(f"{type(bare(env)).__name__} is not resettable: it keeps a {type(value).__name__} in its "
+                        f"attribute {text_of(path)!r}, which changes and cannot be saved; keep numbers, arrays, flags, "
+                        f"or lists and dictionaries of them instead")
 
 
 def fingerprint(value: Any) -> Any:
     """Return what changes if an opaque value does; None where that cannot be seen, and it can only change."""
     if isinstance(value, io.IOBase):
-        return value.tell() if not value.closed and value.readable() and value.seekable() else id(value)
+        return value.seek(0, io.SEEK_CUR) if not value.closed and value.readable() and value.seekable() else id(value)
     if hasattr(value, "qpos") and hasattr(value, "time"):  # a simulation of MuJoCo
         return value.time, value.qpos.tobytes()
     return None if hasattr(value, "__next__") else id(value)

@@ -1,9 +1,9 @@
 """The memory of an environment: its attributes that change, as numbers [M] of a state."""
 
 from collections.abc import Iterable, Mapping
-from copy import deepcopy
+from copy import copy, deepcopy
 from enum import Enum
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from pbcs_ompl.resettable.memory.plain_values import (
     to_text,
     unpack,
 )
+from pbcs_ompl.resettable.task_env import bare
 
 LARGEST = 4096
 """Numbers that one attribute may add to a state."""
@@ -50,16 +51,17 @@ class Memory:
 
     def __init__(self, env: Any, changes: Changes, before: Mapping[Path, Any], besides: Iterable[str] = (),
                  known: Iterable[Any] = ()):
-        refuse_random(env, changes)
-        self._env, self._besides = env, frozenset(besides)
+        refuse_random(bare(env), changes)
+        self._env, self._besides = bare(env), frozenset(besides)
         self._names = names_of({type(owner) for owner in changes.owned.owners.values()}, FIRST_METHODS)
         saved = {id(value) for value in known}
         for path, value in changes.opaque.items():
             if path[0].key not in self._besides and id(value) not in saved and not self._is_unread(path):
-                refuse_opaque(env, path, value)
+                refuse_opaque(self._env, path, value)
         chosen = {path: seen for path, seen in changes.plain.items() if self._is_variable(path, seen)}
-        self._variables = [_Variable(env, path, seen) for path, seen in sorted(chosen.items(), key=lambda each: str(
-            each[0])) if not (self._is_unread(path) and _is_growing(seen))]
+        self._variables = [_Variable(self._env, path, seen)
+                           for path, seen in sorted(chosen.items(), key=lambda item: str(item[0]))
+                           if not (self._is_unread(path) and _is_growing(seen))]
         self._enums = {enum_name(kind): kind for path in chosen for value in [changes.owned.plain.get(path)]
                        for kind in enums_of(value)}
         self.size = sum(variable.size for variable in self._variables)
@@ -69,6 +71,12 @@ class Memory:
         self._shared = [(variable.path, first) for variable in self._variables
                         if (first := changes.first_name(variable.path)) is not None and first in chosen]
         self._saves = 0
+
+    def of(self, env: Any) -> Self:
+        """Return the memory of another instance of the environment."""
+        other = copy(self)
+        other._env = bare(env)
+        return other
 
     @property
     def names(self) -> list[str]:
@@ -110,7 +118,7 @@ class Memory:
 
     def values(self, env: Any) -> dict[str, Any]:
         """Return the attributes of another environment of the same class, by name."""
-        return {text_of(variable.path): variable.read(env) for variable in self._variables}
+        return {text_of(variable.path): variable.read(bare(env)) for variable in self._variables}
 
     def check_constants(self) -> None:
         """Refuse the environment if an attribute has changed that exploration has not seen changing.
@@ -141,7 +149,7 @@ class _Variable:
 
     def __init__(self, env: Any, path: Path, seen: Seen):
         self.path = path
-        self._name = f"{type(env).__name__}: the attribute {text_of(path)!r}"
+        self._name = f"{type(bare(env)).__name__}: the attribute {text_of(path)!r}"
         self._kind = next(iter(seen.kinds)) if len(seen.kinds) == 1 else None
         self._in_place = seen.is_one_object and isinstance(seen.object, np.ndarray)
         if self._kind is None:

@@ -13,6 +13,7 @@ from pbcs_ompl.resettable.memory.code import names_of
 from pbcs_ompl.resettable.memory.exploration import Changes, episodes, refuse_random
 from pbcs_ompl.resettable.memory.owned import Path, find, look, put, text_of
 from pbcs_ompl.resettable.memory.plain_values import same
+from pbcs_ompl.resettable.task_env import bare
 
 STEPS = 20
 FAR = (1, 1_000_000, -1_000_000)
@@ -34,13 +35,13 @@ def refuse_uncovered(env: Any) -> None:
     changes = Changes(env)
     for event in episodes(env):
         changes.add(event)
-    refuse_random(env, changes)
+    refuse_random(bare(env), changes)
     names = names_of({type(owner) for owner in changes.owned.owners.values()}, ("step",))
     for path, seen in changes.plain.items():
         name = next(step.key for step in reversed(path) if not step.is_item)
         is_read = name in names.loaded or not names.loaded
         if (seen.in_step or name in names.stored) and is_read and _matters(env, path):
-            raise NotResettable(f"{type(env).__name__} is not resettable: its steps change the attribute "
+            raise NotResettable(f"{type(bare(env)).__name__} is not resettable: its steps change the attribute "
                                 f"{text_of(path)!r} and read it, and set_env_state does not set it; make it part of "
                                 f"what get_env_state returns")
 
@@ -58,7 +59,7 @@ def _is_set(env: Any, path: Path) -> bool:
     env.set_env_state(state.copy())
     expected = _plain(env, path)
     if type(expected) in (bool, int, float) or isinstance(expected, np.ndarray | np.generic):
-        put(env, path, _another(expected))
+        put(bare(env), path, _another(expected))
     else:
         for action in _actions(env)[:STEPS // 2]:
             if any(env.step(copied(action))[2:4]):
@@ -77,7 +78,7 @@ def _is_read_first(env: Any, path: Path) -> bool:
     read_first = False
     env.reset(seed=0)
     for action in _actions(env):
-        with _traced(env, attribute.key) as uses:
+        with _traced(bare(env), attribute.key) as uses:
             _, _, terminated, truncated, _ = env.step(copied(action))
         if uses is None or (uses and uses[0] == "read"):
             read_first = True
@@ -90,7 +91,7 @@ def _only_counts(env: Any, path: Path) -> bool:
     """Return whether a number has no influence on anything but itself, however far off it is."""
     state = _middle(env)
     env.set_env_state(state.copy())
-    value = find(env, path)
+    value = find(bare(env), path)
     if type(value) not in (int, float) and not isinstance(value, np.integer | np.floating):
         return False
     expected = _reported(env, state, path, value)
@@ -100,7 +101,7 @@ def _only_counts(env: Any, path: Path) -> bool:
 def _reported(env: Any, state: Array, path: Path, value: Any) -> list[tuple[Any, ...]]:
     """Return what steps report from a state, with a value at a path."""
     env.set_env_state(state.copy())
-    put(env, path, value)
+    put(bare(env), path, value)
     reports = []
     for action in _actions(env):
         observation, reward, terminated, truncated, info = env.step(copied(action))
@@ -109,7 +110,7 @@ def _reported(env: Any, state: Array, path: Path, value: Any) -> list[tuple[Any,
                         np.array(env.get_env_state(), dtype=np.float64).tobytes()))
         if terminated or truncated:
             break
-    put(env, path, value)
+    put(bare(env), path, value)
     return reports
 
 
@@ -130,7 +131,7 @@ def _actions(env: Any) -> list[Any]:
 
 
 def _plain(env: Any, path: Path) -> Any:
-    return look(env).plain[path]
+    return look(bare(env)).plain[path]
 
 
 def _another(value: Any) -> Any:
@@ -142,6 +143,7 @@ def _another(value: Any) -> Any:
 @contextmanager
 def _traced(env: Any, name: str) -> Iterator[list[str] | None]:
     """Note how an attribute of `env` is used; None where its class does not allow that."""
+    env = bare(env)
     kind, uses = type(env), list[str]()
 
     class Traced(kind):  # type: ignore[misc, valid-type]
