@@ -96,7 +96,8 @@ def run_study(study: Study | str | Path, *, out: str | Path, seeds: int | None =
             raise PbcsError(f"all runs of {chosen.id} failed; {name}: {reason}")
         figures = folder.path / FIGURES
         figures.mkdir(exist_ok=True)
-        claims = chosen.analyse(list(records.values()), figures)
+        with code_of_others(f"the analysis of the study {chosen.id}"):
+            claims = chosen.analyse(list(records.values()), figures)
         result = StudyResult(chosen.id, list(records.values()), failed, str(folder.path),
                              [str(path) for path in sorted(figures.glob("*.png"))], claims)
         folder.write_result(result.summary())
