@@ -14,7 +14,9 @@ from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap, copied
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
+from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.observing import state_observer
 from pbcs_ompl.resettable.rules import Outcome
 from pbcs_ompl.resettable.supported import TaskMaker
 
