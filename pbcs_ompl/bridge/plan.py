@@ -30,6 +30,7 @@ from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.results.checksums import SUMS
 from pbcs_ompl.results.files import CONFIG, PROVENANCE, RESULT, TRAJECTORY, TREE, write_errors
 from pbcs_ompl.results.folder import RunFolder, read_folder, start_run
 from pbcs_ompl.results.provenance import planning_versions
@@ -255,11 +256,11 @@ def _new_folder(out: str | Path | None, config: dict[str, Any]) -> Iterator[RunF
             yield folder
             return
         except BaseException:
-            for name in (*PARTS, CONFIG, PROVENANCE, RESULT):
+            for name in (*PARTS, CONFIG, PROVENANCE, RESULT, SUMS):
                 (folder.path / name).unlink(missing_ok=True)
             folder.close()
             if not existed:
-                with suppress(OSError):  # somebody else has removed it, or put something there
+                with suppress(OSError):  # others have removed it, or put something there
                     folder.path.rmdir()
             raise
 

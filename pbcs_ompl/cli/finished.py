@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pbcs_ompl.bridge.plan import PlanResult, read_plan
 from pbcs_ompl.cli.arguments import environment
-from pbcs_ompl.results.files import CHECKPOINT, CONFIG, RESULT, read_toml
+from pbcs_ompl.results.files import CHECKPOINT, CONFIG, RESULT, is_there, read_toml
 from pbcs_ompl.results.folder import RunFolder
 
 TREE_PICTURE, CHAIN_PICTURE = "tree.png", "chain.png"
@@ -34,5 +34,5 @@ def finished_plan(arguments: Namespace, out: Path) -> PlanResult | None:
 
 def lacks_picture_only(out: Path) -> bool:
     """Return whether the training in a folder has ended and only its picture is missing."""
-    return ((out / RESULT).is_file() and not (out / CHECKPOINT).exists() and (out / CONFIG).is_file()
+    return ((out / RESULT).is_file() and not is_there(out / CHECKPOINT) and (out / CONFIG).is_file()
             and not (out / CHAIN_PICTURE).exists())

@@ -10,7 +10,7 @@ from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.experiments.run import Failure, Record, Run, RunFunction
 from pbcs_ompl.experiments.workers import Executor, Limits
 from pbcs_ompl.results.checksums import Checksums, write_summed_json
-from pbcs_ompl.results.files import RUNS, read_json
+from pbcs_ompl.results.files import RUNS, is_there, read_json
 
 REMEDY = "remove the file to have this run made again"
 
@@ -40,7 +40,7 @@ def read_records(folder: Path, runs: Sequence[Run], kind: Any = dict[str, Any]) 
     """
     files = {run.name: record_file(folder, run.name) for run in runs}
     sums = {place: Checksums(place) for place in {file.parent for file in files.values()}}
-    return {name: _read_record(file, kind, sums[file.parent]) for name, file in files.items() if file.exists()}
+    return {name: _read_record(file, kind, sums[file.parent]) for name, file in files.items() if is_there(file)}
 
 
 def _read_record(file: Path, kind: Any, sums: Checksums) -> Record:

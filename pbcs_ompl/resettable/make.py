@@ -14,7 +14,6 @@ import gymnasium
 from gymnasium.envs import registration
 
 from pbcs_ompl.core.callbacks import code_of_others, describe
-from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, UnknownName, did_you_mean
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -29,7 +28,6 @@ KNOWN_TO_FAIL = ("Fetch", "Hand", "FrankaKitchen", "MaMuJoCo")
 ROBOTICS = ("PointMaze", "AntMaze", "Adroit", *KNOWN_TO_FAIL)
 
 
-@checked
 def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[str, Any] | None = None, *,
          goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
          reset_options: dict[str, Any] | None = None, max_episode_steps: int | None = None,
@@ -73,9 +71,10 @@ def _make(spec: EnvSpec, goal: str | GoalRule | None, feature: str | FeatureRule
     prefer_headless_rendering()
     spec = replace(spec, goal=goal if isinstance(goal, str) else None,
                    feature=feature if isinstance(feature, str) else None)
+    make_env = partial(fresh_env, spec)
     with code_of_others(f"the environment {spec.id!r}"):
         model = adapt_without_copy(_gymnasium_make(spec), goal=goal, feature=feature, reset_options=spec.reset_options,
-                                   make_env=partial(fresh_env, spec))
+                                   make_env=make_env)
     model.spec = replace(model.spec, id=spec.id, start_seed=spec.start_seed, reset_options=spec.reset_options,
                          max_episode_steps=spec.max_episode_steps)  # the id with its module, if it names one
     return model

@@ -43,6 +43,16 @@ def flat_bounds(space: gymnasium.Space[Any]) -> tuple[Array, Array]:
     return np.concatenate(low), np.concatenate(high)
 
 
+def rounded(vectors: Array, space: gymnasium.Space[Any]) -> Array:
+    """Return observations [B, O] as an environment returns them: in float32 where a box of its space is."""
+    ends = np.cumsum([flat_size(part) for part in parts(space)])
+    if vectors.shape[1] != ends[-1]:
+        return vectors
+    pieces = [piece.astype(part.dtype).astype(np.float64) if isinstance(part, spaces.Box) and part.dtype.kind == "f"
+              else piece for part, piece in zip(parts(space), np.split(vectors, ends[:-1], axis=1), strict=True)]
+    return np.concatenate(pieces, axis=1)
+
+
 def unflat(vector: Array, space: gymnasium.Space[Any]) -> Any:
     """Return the observation, a member of `space` but for rounding, that `flat` makes a vector of."""
     if isinstance(space, spaces.Dict | spaces.Tuple):

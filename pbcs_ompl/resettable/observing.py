@@ -9,7 +9,7 @@ import numpy as np
 from pbcs_ompl.core.errors import NotResettable
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.attributes import EnvAttributes
-from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.observations import flat, rounded
 from pbcs_ompl.resettable.task_env import TaskEnv, bare
 
 STEPS = 5
@@ -26,7 +26,8 @@ def state_observer(env: Any, offers: EnvAttributes) -> Observe | None:
     """
     observe = offers.observe
     if observe is not None:
-        return lambda states: _through(env, _vectors(observe(np.array(states, dtype=np.float64))))
+        space = bare(env).observation_space
+        return lambda states: _through(env, rounded(_vectors(observe(np.array(states, dtype=np.float64))), space))
     kind = observed_type(bare(env), reset_options(env))
     if kind is None:
         return None

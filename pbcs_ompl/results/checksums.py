@@ -18,6 +18,7 @@ from pbcs_ompl.results.files import (
     PROVENANCE,
     RESULT,
     RUNS,
+    is_there,
     read_bytes,
     to_json,
     to_toml,
@@ -41,7 +42,7 @@ class Checksums:
     def __init__(self, folder: Path):
         self._sums: dict[str, set[str]] = defaultdict(set)
         path = folder / SUMS
-        if path.exists():
+        if is_there(path):
             try:
                 lines = read_bytes(path).decode(errors="replace").splitlines()
             except (OSError, ValueError) as error:
@@ -51,13 +52,13 @@ class Checksums:
                 self._sums[name].add(checksum)
 
     def is_changed(self, path: Path) -> bool:
-        """Return whether a file of the folder is another than the one that was written."""
+        """Return whether a file of the folder is another than the one that was written, or has gone."""
         known = self._sums.get(path.name)
-        return known is not None and path.is_file() and _sum(read_bytes(path)) not in known
+        return known is not None and not (path.is_file() and _sum(read_bytes(path)) in known)
 
 
 def changed_files(folder: Path) -> list[Path]:
-    """Return the text files of a result folder, the records of its runs among them, that were changed afterwards."""
+    """Return the text files of a result folder that were changed or removed; of the records only changed ones."""
     files = [folder / name for name in (CONFIG, RESULT, PROVENANCE, PLAN)] + sorted(folder.glob(f"{RUNS}/**/*.json"))
     sums = {place: Checksums(place) for place in {file.parent for file in files}}
     return [file for file in files if sums[file.parent].is_changed(file)]

@@ -103,6 +103,11 @@ def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:
     write_atomically(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
 
 
+def is_there(path: Path) -> bool:
+    """Return whether there is a file of this name, even a broken link or a pipe: reading it says what is wrong."""
+    return os.path.lexists(path)
+
+
 def read_json(path: Path, kind: Any = Any, *, finite: bool = True) -> Any:
     """Read JSON.
 
@@ -195,7 +200,7 @@ def _read(path: Path, load: Callable[[], Content]) -> Content:
 
 def to_json(value: Any) -> str:
     """Return a value as JSON; NumPy values and paths become plain ones."""
-    return json.dumps(value, indent=2, default=plain) + "\n"
+    return json.dumps(value, indent=2, default=plain, ensure_ascii=False) + "\n"
 
 
 def to_toml(table: dict[str, Any]) -> str:

@@ -16,6 +16,7 @@ from pbcs_ompl.results.files import (
     CONFIG,
     PROVENANCE,
     RESULT,
+    is_there,
     read_json,
     read_toml,
     sweep_temporaries,
@@ -82,7 +83,7 @@ class RunFolder:
     def _note_provenance(self) -> None:
         """Add this process to those that worked here, unless one with the same versions and machine did."""
         path = self.path / PROVENANCE
-        before = read_json(path, Provenance) if path.is_file() else []
+        before = read_json(path, Provenance) if is_there(path) else []
         if provenance() not in before:
             write_summed_json(path, [*before, provenance()])
 
@@ -107,7 +108,7 @@ def start_run(path: Path, config: dict[str, Any], *, may_change: tuple[str, ...]
     Args:
         path: The folder.
         config: The settings; see `RunFolder.write_config`.
-        may_change: Settings that do not tell two runs apart.
+        may_change: Settings in which equal runs may differ.
         parts: The files of such a run, which are removed: it is made again.
 
     Raises:
@@ -230,7 +231,7 @@ def read_folder(path: Path) -> Folder:
     config = read_config(path)
     kind = config["kind"]
     check(path / CONFIG, config, CONFIGS[kind])
-    result = read_json(path / RESULT, RESULTS[kind], finite=kind != "study") if (path / RESULT).exists() else None
+    result = read_json(path / RESULT, RESULTS[kind], finite=kind != "study") if is_there(path / RESULT) else None
     return Folder(path, config["kind"], config, result, _provenance(path, config))
 
 
@@ -252,7 +253,7 @@ def read_config(path: Path, kind: str | None = None) -> dict[str, Any]:
 
 
 def _provenance(path: Path, config: dict[str, Any]) -> list[dict[str, str]]:
-    if not (path / PROVENANCE).is_file():
+    if not is_there(path / PROVENANCE):
         return [config["versions"]] if "versions" in config else []
     found: list[dict[str, str]] = read_json(path / PROVENANCE, Provenance)
     return found

@@ -221,11 +221,11 @@ def read_config(path: Path, *, trust: bool = False) -> tuple[EnvSpec, TrainConfi
     values = read_toml(path)
     if values.get("kind") != "train":
         raise DamagedFile(f"{path} is not that of a training: its kind is {values.get('kind')!r}; expected 'train'")
-    check(path, values, schema.TrainConfig)
     try:
         environment = EnvSpec.from_dict(values.get("environment"), trusted=trust)
         if not trust:
             refuse_modules(str(path), [*environment.modules, *config_modules(values)])
+        check(path, values, schema.TrainConfig)
         return environment, TrainConfig.from_dict(values), values.get("versions", {})
     except DamagedFile as error:
         raise DamagedFile(f"{path}: {error}") from error

@@ -19,7 +19,7 @@ from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.checksums import changed_files
-from pbcs_ompl.results.files import CHECKPOINT, CONFIG, RESULT, read_toml
+from pbcs_ompl.results.files import CHECKPOINT, CONFIG, PLAN, RESULT, is_there, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.config import TrainConfig, read_config
 from pbcs_ompl.skills.training import Training, TrainResult, training_versions
@@ -103,11 +103,11 @@ def resume(folder: str | Path, *, max_transitions: int | None = None, trust: boo
         UntrustedModule: the folder names a module, and is not trusted.
     """
     with RunFolder(folder, resume=True) as opened:
-        if (opened.path / RESULT).is_file() and not (opened.path / CHECKPOINT).is_file():
+        if is_there(opened.path / RESULT) and not is_there(opened.path / CHECKPOINT):
             raise RunFolderError(f"the training in {opened.path} has ended; there is nothing to resume")
         environment, config, versions = read_config(opened.path / CONFIG, trust=trust)
         _warn_of_other_versions(opened.path, versions)
-        for file in changed_files(opened.path):
+        for file in (file for file in changed_files(opened.path) if file.name in (CONFIG, PLAN)):
             warnings.warn(f"{file} was changed after it was written; the training goes by what it says now",
                           stacklevel=2)
         if max_transitions is not None:

@@ -21,7 +21,7 @@ from pbcs_ompl.core.signals import interruptible
 from pbcs_ompl.core.types import Array, Counter, ProgressCallback
 from pbcs_ompl.resettable.task import Task
 from pbcs_ompl.results.checksums import write_summed_json
-from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, read_json, read_toml
+from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.results.provenance import planning_versions
 from pbcs_ompl.results.schema import PlanEffort
@@ -153,7 +153,7 @@ class Training:
 
     def _plan(self, trajectory: Trajectory | None) -> tuple[Trajectory | None, int, str | None]:
         """Return the plan, the transitions it took, and why there is none to train along."""
-        if self.path and self.resumed and (self.path / PLAN).is_file():
+        if self.path and self.resumed and is_there(self.path / PLAN):
             trajectory = Trajectory.load(self.path / TRAJECTORY)
             self._check_replays(trajectory)
             return trajectory, read_json(self.path / PLAN, PlanEffort)["transitions"], None
@@ -209,7 +209,7 @@ class Training:
         trainer = SkillTrainer(self.config.agent_factory(self.model), self._waypoints(trajectory),
                                self.settings.episodes, counter, self.seeds.child("skills").generator())
         method = METHODS[self.config.method].build(trainer, self.settings)
-        if self.path and self.resumed and (self.path / CHECKPOINT).is_file():
+        if self.path and self.resumed and is_there(self.path / CHECKPOINT):
             self.began -= restore(method, self.path / CHECKPOINT)
         return method
 

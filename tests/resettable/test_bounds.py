@@ -69,7 +69,7 @@ class Declared(Edge):
     state_high = property(lambda self: self.observation_space.high)
 
     def observe(self, states: Any) -> Any:
-        return states.astype(np.float32)
+        return states
 
 
 class Distant(Declared):

@@ -11,6 +11,7 @@ from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes, plain_copies
 from pbcs_ompl.resettable.memory.memory import Memory
 from pbcs_ompl.resettable.rules import FeatureRule, feature_rule
+from pbcs_ompl.resettable.task_env import bare
 
 TUPLE = 1.0
 """Stands for the width where the state is a tuple of numbers."""
@@ -70,12 +71,12 @@ class AttributeEnv(RestorableEnv):
     def observation(self) -> Any:
         """Return the environment's own observation, else the state."""
         observe = getattr(self.inner, "_get_obs", getattr(self.inner, "_get_ob", None))  # the latter is Acrobot's
-        return np.asarray(self.inner.state, self.inner.observation_space.dtype) if observe is None else observe()
+        return np.asarray(self.inner.state, bare(self.inner).observation_space.dtype) if observe is None else observe()
 
 
 def has_state_attribute(env: Any) -> bool:
     """Return whether `env` is one of Gymnasium's classic control environments with a vector `state`; resets it."""
-    if not type(env).__module__.startswith("gymnasium.envs.classic_control"):
+    if not type(bare(env)).__module__.startswith("gymnasium.envs.classic_control"):
         return False
     env.reset(seed=0)
     return isinstance(getattr(env, "state", None), np.ndarray | tuple)

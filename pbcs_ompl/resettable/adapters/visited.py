@@ -69,7 +69,8 @@ class VisitedEnv(RestorableEnv):
         seed = int(np.random.default_rng().integers(2**32)) if seed is None else seed
         observation, info = super().reset(seed=seed, options=options)
         self._name = float(seed)
-        self._keep(flat(observation), None, None)
+        self._observations[self._name] = flat(observation)
+        self.keep(self._name, None, None)
         return observation, info
 
     def step(self, action: Array) -> Any:
@@ -77,14 +78,9 @@ class VisitedEnv(RestorableEnv):
         before, action = self._name, copied(action)
         outcome = super().step(action)
         self._name = child_hash(before, action)
-        self._keep(flat(outcome[0]), before, action)
+        self._observations[self._name] = flat(outcome[0])
+        self.keep(self._name, before, action)
         return outcome
-
-    def _keep(self, observation: Array, before: float | None, action: Array | None) -> None:
-        """Keep what the present state is found again by; not of the steps that only show the range of the feature."""
-        if not self.exploring:
-            self._observations[self._name] = observation
-            self.keep(self._name, before, action)
 
     @abstractmethod
     def keep(self, name: float, before: float | None, action: Array | None) -> None:

@@ -137,7 +137,7 @@ def refuse_random(env: Any, changes: Changes) -> None:
         NotResettable: they do.
     """
     if changes.random:
-        raise NotResettable(f"{type(env).__name__} is not resettable: its steps draw random numbers from "
+        raise NotResettable(f"{type(bare(env)).__name__} is not resettable: its steps draw random numbers from "
                             f"{changes.random}; make the randomness part of its state, or draw all of it in reset")
 
 
@@ -147,9 +147,9 @@ def refuse_opaque(env: Any, path: Path, value: Any) -> None:
     Raises:
         NotResettable: always.
     """
-    raise NotResettable(f"{type(env).__name__} is not resettable: it keeps a {type(value).__name__} in its attribute "
-                        f"{text_of(path)!r}, which changes and cannot be saved; keep numbers, arrays, flags, or lists "
-                        f"and dictionaries of them instead")
+    raise NotResettable(f"{type(bare(env)).__name__} is not resettable: it keeps a {type(value).__name__} in its "
+                        f"attribute {text_of(path)!r}, which changes and cannot be saved; keep numbers, arrays, flags, "
+                        f"or lists and dictionaries of them instead")
 
 
 def fingerprint(value: Any) -> Any:

@@ -151,7 +151,7 @@ class _Variable:
 
     def __init__(self, env: Any, path: Path, seen: Seen):
         self.path = path
-        self._name = f"{type(env).__name__}: the attribute {text_of(path)!r}"
+        self._name = f"{type(bare(env)).__name__}: the attribute {text_of(path)!r}"
         self._kind = next(iter(seen.kinds)) if len(seen.kinds) == 1 else None
         self._in_place = seen.is_one_object and isinstance(seen.object, np.ndarray)
         if self._kind is None:

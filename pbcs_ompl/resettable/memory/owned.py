@@ -12,6 +12,7 @@ import gymnasium
 import numpy as np
 
 from pbcs_ompl.resettable.memory.plain_values import is_plain
+from pbcs_ompl.resettable.task_env import bare
 
 NOT_STATE = frozenset({"np_random", "_np_random", "_np_random_seed", "spec", "metadata", "action_space",
                        "observation_space", "render_mode", "mujoco_renderer"})
@@ -54,7 +55,8 @@ class Owned(NamedTuple):
 
 
 def look(root: Any) -> Owned:
-    """Return what `root` owns; each object once, at the first way that leads to it."""
+    """Return what `root`, below its wrappers, owns; each object once, at the first way that leads to it."""
+    root = bare(root)
     owned = Owned({}, {}, {}, {(): root})
     seen = {id(root)}
     waiting: deque[tuple[Path, Any]] = deque([((), root)])
@@ -84,6 +86,7 @@ def find(root: Any, path: Path) -> Any:
     Raises:
         AttributeError, LookupError: there is none.
     """
+    root = bare(root)
     for key, is_item in path:
         root = root[key] if is_item else getattr(root, key)
     return root

@@ -143,6 +143,7 @@ def _another(value: Any) -> Any:
 @contextmanager
 def _traced(env: Any, name: str) -> Iterator[list[str] | None]:
     """Note how an attribute of `env` is used; None where its class does not allow that."""
+    env = bare(env)
     kind, uses = type(env), list[str]()
 
     class Traced(kind):  # type: ignore[misc, valid-type]

@@ -20,7 +20,7 @@ from pbcs_ompl.results.command_line import (
     study_words,
     train_words,
 )
-from pbcs_ompl.results.files import CHECKPOINT, PLAN, TRAJECTORY, read_json, read_toml
+from pbcs_ompl.results.files import CHECKPOINT, PLAN, TRAJECTORY, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import Folder
 from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.config import config_modules
@@ -42,7 +42,7 @@ def repeating(folder: Folder) -> str:
 
 def resuming(folder: Folder) -> str:
     """Return the command that resumes a run that has not ended; "" for one that has."""
-    if folder.kind == "train" and (folder.result is None or (folder.path / CHECKPOINT).is_file()):
+    if folder.kind == "train" and (folder.result is None or is_there(folder.path / CHECKPOINT)):
         budget = 2 * folder.config["max_transitions"] if folder.result else None
         return command(resume_words(folder.path, budget, trust=_names_modules(folder.config)))
     if folder.kind in ("compare", "study") and folder.result is None and repeating(folder).startswith("pbcs "):
@@ -94,7 +94,7 @@ def _words(folder: Folder) -> Words:
 
 def _given_trajectory(folder: Path) -> Path | None:
     """Return the trajectory that a training was given; None where it was planned, which takes a transition at least."""
-    given = (folder / PLAN).is_file() and read_json(folder / PLAN, PlanEffort)["transitions"] == 0
+    given = is_there(folder / PLAN) and read_json(folder / PLAN, PlanEffort)["transitions"] == 0
     return folder / TRAJECTORY if given else None
 
 

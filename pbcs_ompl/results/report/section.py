@@ -80,7 +80,7 @@ def make_section(path: Path, root: Path) -> Section:
     _check_inside(path, [*path.glob("*.json"), *path.glob("*.toml"), *path.glob(f"{RUNS}/**/*.json"), *pictures])
     folder = read_folder(path)
     content = read_content(folder)
-    changed = [(str(file), "was changed after it was written") for file in changed_files(path)]
+    changed = [(str(file), "was changed or removed after it was written") for file in changed_files(path)]
     content = replace(content, failures=[*changed, *content.failures])
     return Section(_name(path, root), folder.kind, content, [read_figure(picture) for picture in pictures],
                    read_bytes(path / CONFIG).decode("utf-8"), _versions(folder.provenance), repeating(folder),
