@@ -65,6 +65,8 @@ def proved(env: Provable, make_inner: TaskMaker | None) -> Provable:
     if not found:
         return env
     assert make_inner is not None
+    if isinstance(env, RestorableEnv):
+        env.check_constants()
     inner: Any = getattr(env, "inner", env)
     if random := fresh_difference(env, make_inner):
         raise NotResettable(_random(inner, random))
