@@ -120,7 +120,7 @@ def _doctor(verb: Parser) -> None:
     _add_environment(verb, required=False)
     verb.add_argument("--all", action="store_true",
                       help="check every environment that is registered here, and write a page; again to continue")
-    verb.add_argument("--max-seconds", type=seconds, default=60.0, metavar="S",
+    verb.add_argument("--max-seconds", type=seconds, metavar="S",
                       help="of --all: how long one environment may take (60)")
     verb.add_argument("--out", metavar="DIR", help="of --all: folder of environments.md and .json (runs/doctor)")
 

@@ -29,6 +29,9 @@ def run(arguments: Namespace) -> int:
     """Look, change nothing. Returns 3 when a needed library is missing, 1 when the environment fails."""
     if arguments.all:
         return _run_survey(arguments)
+    for name in ("out", "max_seconds"):
+        if getattr(arguments, name) is not None:
+            raise InvalidOption(f"--{name.replace('_', '-')} goes with --all")
     versions = {"python": python_version(), **{name: _version(name) for name in NEEDED + OPTIONAL}}
     missing = [name for name in NEEDED if versions[name] is None]
     result: dict[str, Any] = {
@@ -45,20 +48,20 @@ def run(arguments: Namespace) -> int:
 
 def _run_survey(arguments: Namespace) -> int:
     """Check all environments, and write the page."""
-    from pbcs_ompl.resettable.survey import VERDICTS, Record, registered, survey
+    from pbcs_ompl.resettable.survey import TIME_OUT, VERDICTS, Record, registered, survey
     from pbcs_ompl.resettable.survey_page import survey_page
 
     if arguments.env is not None:
         raise InvalidOption("--all checks every environment; leave out --env")
     out = Path(arguments.out or SURVEY)
-    ids = registered()
+    ids, limit = registered(), arguments.max_seconds or TIME_OUT
 
     def show(record: Record, done: int) -> None:
         print(f"{done}/{len(ids)} {record['id']}: {record['verdict']} {record['why']}".rstrip(), file=sys.stderr)
 
-    records = survey(ids, out / "environments.json", seconds=arguments.max_seconds, on_record=show)
+    records = survey(ids, out / "environments.json", seconds=limit, on_record=show)
     page = out / "environments.md"
-    write_text(page, survey_page(records, command(["doctor", "--all"]), arguments.max_seconds))
+    write_text(page, survey_page(records, command(["doctor", "--all"]), limit))
     counts = {verdict: sum(record["verdict"] == verdict for record in records) for verdict in VERDICTS}
     lines = [("", f"{count} {verdict}") for verdict, count in counts.items()]
     print_summary({"verdicts": counts, "page": str(page)}, [*lines, ("page", str(page))], as_json=arguments.json)

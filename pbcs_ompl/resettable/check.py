@@ -176,7 +176,7 @@ class _Trial:
 
     def elsewhere(self) -> str:
         other = self._second()
-        other.reset(seed=54321)
+        other.reset(seed=54321, options=self.model.spec.reset_options)
         found = self.first.difference(self.roll(other, self.start))
         other.close()
         return found

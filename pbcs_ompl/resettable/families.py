@@ -39,7 +39,8 @@ def restorable(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None
     if has_state_attribute(inner):
         return proved(AttributeEnv(inner, goal, feature), make_inner)
     if replays(inner):
-        if copies_are_faithful(inner) and not _difference(env := CopiedEnv(inner, goal, feature), make_inner):
+        apart = inner if make_inner is None else make_inner()  # the copies of some physics servers close the original
+        if copies_are_faithful(apart) and not _difference(env := CopiedEnv(inner, goal, feature), make_inner):
             return env
         if not _difference(replayed := ReplayedEnv(inner, goal, feature), make_inner):
             _warn(f"{_name(inner)} is restored by replaying its actions, which is slow: {HOW_TO}")
@@ -64,6 +65,8 @@ def proved(env: Provable, make_inner: TaskMaker | None) -> Provable:
     if not found:
         return env
     assert make_inner is not None
+    if isinstance(env, RestorableEnv):
+        env.check_constants()
     inner: Any = getattr(env, "inner", env)
     if random := fresh_difference(env, make_inner):
         raise NotResettable(_random(inner, random))

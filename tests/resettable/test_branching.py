@@ -8,8 +8,8 @@ import pytest
 
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import NotResettable, UnsupportedSpace
-from pbcs_ompl.resettable import adapt, check_resettable
-from pbcs_ompl.resettable.adapters.visited import CopiedEnv, FreshEnv
+from pbcs_ompl.resettable import adapt, check_resettable, make
+from pbcs_ompl.resettable.adapters.visited import CopiedEnv, FreshEnv, ReplayedEnv
 from pbcs_ompl.resettable.branching import first_difference
 from tests.resettable.toys import Line
 
@@ -157,3 +157,33 @@ def test_pixels_are_refused_at_once() -> None:
 
     with pytest.raises(UnsupportedSpace, match="vectors of numbers, such as the state"):
         adapt(Pixels())
+
+
+def test_copies_that_close_the_original_do_no_harm() -> None:
+    class Served(Line):
+        """Its copies share a connection, and the end of a copy is the end of the connection."""
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.connection, self.is_copy = [True], False
+
+        def __deepcopy__(self, memo: dict[int, Any]) -> "Served":
+            copy = Served()
+            copy.connection, copy.is_copy = self.connection, True
+            return copy
+
+        def __del__(self) -> None:
+            if self.is_copy:
+                self.connection[0] = False
+
+        def reset(self, **options: Any) -> Any:
+            assert self.connection[0], "not connected"
+            return super().reset(**options)
+
+    gymnasium.register("Served-v0", Served)
+    try:
+        model: Any = make("Served-v0")
+        assert isinstance(model.env, ReplayedEnv)
+        model.initial_state(0)
+    finally:
+        gymnasium.registry.pop("Served-v0")

@@ -287,3 +287,21 @@ def test_names_in_code() -> None:
     assert not {"g", "h"} & (found.stored | found.loaded)
     assert "d" in found.loaded
     assert "e" not in found.loaded
+
+
+def test_numbers_that_are_not_finite_are_restored() -> None:
+    class Closest(Cart):
+        def begin(self) -> None:
+            self.closest, self.worst = np.inf, np.full(2, -np.inf)
+
+        def push(self, action: float) -> None:
+            super().push(action)
+            self.closest = min(self.closest, abs(float(self.data.qpos[0]) - 1.0))
+            self.worst[0] = max(self.worst[0], action)
+
+        def reward(self) -> float:
+            return self.closest + float(self.worst[0])
+
+    model: Any = adapt(Closest())
+    assert np.isfinite(model.initial_state(0)).all()
+    assert first_difference(model.env, Closest, steps=LONG, seed=5) == ""

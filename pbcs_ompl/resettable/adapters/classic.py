@@ -60,6 +60,10 @@ class AttributeEnv(RestorableEnv):
         array = numbers.astype(np.float32 if width == 4.0 else np.float64)
         self.inner.state = tuple(array.tolist()) if width == TUPLE else array
 
+    def check_constants(self) -> None:
+        """Refuse an environment of which something else has changed than what is saved."""
+        self._memory.check_constants()
+
     def named_state(self, env: Any) -> dict[str, Any]:
         """Return the parts of the state of an environment of this class, by name."""
         return {"state": env.state, **self._memory.values(env)}

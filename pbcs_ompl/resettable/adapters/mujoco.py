@@ -80,7 +80,7 @@ class MujocoEnv(RestorableEnv):
         """Return physics, what is read before it is written, what changes in the model, and attributes."""
         self._saves += 1
         if self._saves % GUARD_EVERY == 0:
-            self._parts.check(self.inner)
+            self.check_constants()
         model, data = self.inner.model, self.inner.data
         return np.concatenate([self._physics.save(model, data), self._read_first.save(data), self._parts.save(model),
                                self._memory.save()])
@@ -108,6 +108,11 @@ class MujocoEnv(RestorableEnv):
         self._physics.load(model, data, physics)  # the warm start
         self._read_first.load(data, read_first)
         return _observed(self.inner)
+
+    def check_constants(self) -> None:
+        """Refuse an environment of which something else has changed than what is saved."""
+        self._parts.check(self.inner)
+        self._memory.check_constants()
 
     def named_state(self, env: Any) -> dict[str, Any]:
         """Return the parts of the state of an environment of this class, by name."""

@@ -5,8 +5,8 @@ those of the step before. An environment that reads them then (the body's place 
 them: these are found by trying, and saved.
 """
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -53,6 +53,7 @@ class ModelParts:
         self._last = self._bytes(model, self._names)
         self._arrays = {name: np.array(_get(model, name)) for name in self._names}
         self._rows: dict[str, IndexArray] = {}
+        self._places: list[_Place] = []
         self.size = 0
 
     def look(self, model: Any, *, after_reset: bool) -> None:
@@ -65,18 +66,15 @@ class ModelParts:
 
     def save(self, model: Any) -> Array:
         """Return the numbers that change [N]."""
-        if not self._rows:
-            return np.empty(0)
-        return np.concatenate([np.ravel(_rows(_get(model, name), rows)) for name, rows in self._rows.items()])
+        saved = np.empty(self.size)
+        for name, rows, shape, start, stop in self._places:
+            saved[start:stop].reshape(shape)[...] = _rows(_get(model, name), rows)
+        return saved
 
     def load(self, model: Any, saved: Array) -> None:
         """Set the numbers that change [N]."""
-        at = 0
-        for name, rows in self._rows.items():
-            part = _rows(_get(model, name), rows)
-            size = int(np.size(part))
-            _set(model, name, rows, saved[at:at + size].reshape(np.shape(part)))
-            at += size
+        for name, rows, shape, start, stop in self._places:
+            _set(model, name, rows, saved[start:stop].reshape(shape))
 
     def clear(self, model: Any) -> None:
         """Set the numbers that change to what they were at first."""
@@ -110,7 +108,8 @@ class ModelParts:
         changed = np.ones(1, np.bool_) if not now.ndim else (now != before).reshape(len(now), -1).any(axis=1)
         rows = np.flatnonzero(changed)
         self._rows[name] = np.union1d(self._rows[name], rows) if name in self._rows else rows
-        self.size = sum(int(np.size(_rows(self._arrays[each], chosen))) for each, chosen in self._rows.items())
+        self._places = _places(self._arrays, self._rows)
+        self.size = self._places[-1].stop
         if self.size > MOST_CHANGED:
             raise NotResettable(f"model.{name} changes, and with it a state has more than {MOST_CHANGED} numbers "
                                 f"of the model; change less of it, or implement get_env_state and set_env_state")
@@ -131,6 +130,7 @@ class ReadFirst:
     def __init__(self, model: Any, data: Any, changes_outcome: Callable[[list[tuple[str, int]]], bool]):
         self._try = changes_outcome
         self._rows: dict[str, IndexArray] = {}
+        self._places: list[_Place] = []
         self._candidates = [(name, row) for name, values in derived_arrays(model, data).items()
                             for row in range(len(values))]
         self.size = 0
@@ -139,22 +139,20 @@ class ReadFirst:
         """Find them in the present state, beside those that were found before."""
         for name, row in self._found([each for each in self._candidates if not self._has(*each)]):
             self._rows[name] = np.union1d(self._rows.get(name, np.empty(0, np.intp)), [row]).astype(np.intp)
-        self.size = len(self.save(data))
+        self._places = _places({name: getattr(data, name) for name in self._rows}, self._rows)
+        self.size = self._places[-1].stop if self._places else 0
 
     def save(self, data: Any) -> Array:
         """Return the numbers [R]."""
-        if not self._rows:
-            return np.empty(0)
-        return np.concatenate([getattr(data, name)[rows].ravel() for name, rows in self._rows.items()])
+        saved = np.empty(self.size)
+        for name, rows, shape, start, stop in self._places:
+            saved[start:stop].reshape(shape)[...] = getattr(data, name)[rows]
+        return saved
 
     def load(self, data: Any, saved: Array) -> None:
         """Set the numbers [R]."""
-        at = 0
-        for name, rows in self._rows.items():
-            array = getattr(data, name)
-            size = len(rows) * array[0].size
-            array[rows] = saved[at:at + size].reshape(len(rows), *array.shape[1:])
-            at += size
+        for name, rows, shape, start, stop in self._places:
+            getattr(data, name)[rows] = saved[start:stop].reshape(shape)
 
     def values(self, data: Any) -> dict[str, Any]:
         """Return the numbers, by name."""
@@ -171,6 +169,27 @@ class ReadFirst:
             return rows
         half = len(rows) // 2
         return self._found(rows[:half]) + self._found(rows[half:])
+
+
+class _Place(NamedTuple):
+    """Where rows of an array are in a vector."""
+
+    name: str
+    rows: Any
+    shape: tuple[int, ...]
+    start: int
+    stop: int
+
+
+def _places(arrays: Mapping[str, Array], chosen: Mapping[str, IndexArray]) -> list[_Place]:
+    """Return where the chosen rows of arrays are in a vector; rows that follow each other as a slice, which is fast."""
+    places: list[_Place] = []
+    for name, rows in chosen.items():
+        part, start = _rows(arrays[name], rows), places[-1].stop if places else 0
+        in_a_row = len(rows) == rows[-1] - rows[0] + 1
+        places.append(_Place(name, slice(int(rows[0]), int(rows[-1]) + 1) if in_a_row else rows, np.shape(part), start,
+                             start + int(np.size(part))))
+    return places
 
 
 def overwrite(data: Any, rows: list[tuple[str, int]], sign: float) -> None:
@@ -210,11 +229,11 @@ def _get(model: Any, name: str) -> Any:
     return getattr(model.opt, name[len(OPTIONS):]) if name.startswith(OPTIONS) else getattr(model, name)
 
 
-def _rows(value: Any, rows: IndexArray) -> Any:
+def _rows(value: Any, rows: IndexArray | slice) -> Any:
     return value[rows] if np.ndim(value) else value
 
 
-def _set(model: Any, name: str, rows: IndexArray, part: Array) -> None:
+def _set(model: Any, name: str, rows: IndexArray | slice, part: Array) -> None:
     value = _get(model, name)
     if np.ndim(value):
         value[rows] = part

@@ -124,6 +124,13 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         """Return the parts of the state of an environment like `inner`, by name, to compare them; empty if unknown."""
         return {}
 
+    def check_constants(self) -> None:
+        """Refuse the environment if something has changed that is no part of the state that is saved.
+
+        Raises:
+            NotResettable: says what.
+        """
+
     def is_success(self, outcome: Outcome) -> bool:
         """Return whether an outcome is a success."""
         return bool(self._is_success(outcome))

@@ -18,6 +18,8 @@ from pbcs_ompl.resettable.task_env import bare
 
 SEEDS = (0, 1, 2, 0)
 STEPS = 40
+LARGE = 1e8
+"""Numbers beyond this, infinity and NaN are saved as text: a state is finite and has bounds."""
 HELD = 8
 """Steps for which an action is kept: so an environment gets further than with a new one in each step."""
 Event = Literal["reset", "step"]
@@ -160,13 +162,14 @@ def fingerprint(value: Any) -> Any:
 
 
 def kind_of(value: Any) -> Any:
-    """Return the type of a scalar, type and shape of an array, None for what has no fixed number of numbers."""
-    if type(value) in (bool, int, float):
-        return None if abs(value) > 1e8 and type(value) is int else type(value)
+    """Return the type of a scalar, type and shape of an array, None for what is no fixed number of finite numbers."""
+    kind = type(value)
+    if kind is float or kind is int or kind is bool:
+        return kind if -LARGE < value < LARGE else None
     if isinstance(value, np.generic) and value.dtype.kind in "biuf":
-        return type(value)
+        return kind if -LARGE < float(value) < LARGE else None
     if isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
-        return value.dtype.str, value.shape
+        return (value.dtype, value.shape) if np.isfinite(value).all() else None
     return None
 
 

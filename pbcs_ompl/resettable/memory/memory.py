@@ -27,7 +27,7 @@ from pbcs_ompl.resettable.task_env import bare
 LARGEST = 4096
 """Numbers that one attribute may add to a state."""
 SMALLEST_TEXT = 24
-GUARD_EVERY = 256
+GUARD_EVERY = 1024
 """Saves between two looks at what is taken for constant."""
 FIRST_METHODS = ("reset", "step", "_get_obs")
 
@@ -88,9 +88,11 @@ class Memory:
         self._saves += 1
         if self._saves % GUARD_EVERY == 0:
             self.check_constants()
-        if not self._variables:
-            return np.empty(0)
-        return np.concatenate([variable.save(self._env) for variable in self._variables])
+        saved, at = np.empty(self.size), 0
+        for variable in self._variables:
+            saved[at:at + variable.size] = variable.save(self._env)
+            at += variable.size
+        return saved
 
     def load(self, numbers: Array) -> None:
         """Set the attributes to what `save` returned.
@@ -167,15 +169,15 @@ class _Variable:
         except (AttributeError, LookupError):
             return ABSENT
 
-    def save(self, env: Any) -> Array:
-        """Return the value as numbers."""
+    def save(self, env: Any) -> Any:
+        """Return the value as numbers, or as the only one."""
         value = self.read(env)
         if self._kind is None:
             return pack(b"" if value is ABSENT else self._text(value), self.size, self._name)
-        if kind_of(value) != self._kind:
+        if not self._fits(value):
             raise NotResettable(f"{self._name} has changed its type or shape from {_describe(self._kind)} to "
                                 f"{_describe(kind_of(value) or type(value))}; let it have one of them, from reset on")
-        return np.array(value, dtype=np.float64).reshape(-1)
+        return value.ravel() if isinstance(value, np.ndarray) else value
 
     def load(self, env: Any, numbers: Array, enums: dict[str, type[Enum]]) -> None:
         """Set the value."""
@@ -190,7 +192,12 @@ class _Variable:
         elif self._in_place:
             find(env, self.path)[...] = numbers.reshape(self._kind[1])
         else:
-            put(env, self.path, numbers.reshape(self._kind[1]).astype(np.dtype(self._kind[0])))
+            put(env, self.path, numbers.reshape(self._kind[1]).astype(self._kind[0]))
+
+    def _fits(self, value: Any) -> bool:
+        if isinstance(self._kind, tuple):
+            return isinstance(value, np.ndarray) and (value.dtype, value.shape) == self._kind
+        return bool(kind_of(value) == self._kind)
 
     def _scalar(self, number: float) -> Any:
         assert self._kind is not None
