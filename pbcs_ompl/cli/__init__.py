@@ -19,6 +19,8 @@ from pbcs_ompl.core.formatting import one_line
 from pbcs_ompl.core.signals import signal_of, signals_interrupt
 from pbcs_ompl.core.trust import module_names
 
+MOST_LETTERS = 100
+"""Of a name that is shown."""
 WRONG_INPUT, OUR_MISTAKE, STOPPED, SIGPIPE = 2, 4, 128, 13
 
 
@@ -44,6 +46,8 @@ def _run(words: list[str]) -> int:
         return _complain(error, f"interrupted; {remedy}", STOPPED + signal_of(error))
     except OutputClosed:
         return STOPPED + SIGPIPE
+    except OSError as error:  # of a file that cannot be read, for instance
+        return _complain(error, f"error: {error.strerror or error}: {str(error.filename)[:MOST_LETTERS]}", WRONG_INPUT)
     except MemoryError as error:
         return _complain(error, f"error: out of memory; {error}", WRONG_INPUT)
     except Exception as error:

@@ -14,6 +14,7 @@ import gymnasium
 from gymnasium.envs import registration
 
 from pbcs_ompl.core.callbacks import code_of_others, describe
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, MissingDependency, UnknownName, did_you_mean
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -28,6 +29,7 @@ KNOWN_TO_FAIL = ("Fetch", "Hand", "FrankaKitchen", "MaMuJoCo")
 ROBOTICS = ("PointMaze", "AntMaze", "Adroit", *KNOWN_TO_FAIL)
 
 
+@checked
 def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[str, Any] | None = None, *,
          goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
          reset_options: dict[str, Any] | None = None, max_episode_steps: int | None = None,

@@ -9,6 +9,7 @@ import gymnasium
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.resettable.adapt import adapt_without_copy
 from pbcs_ompl.resettable.fresh import EnvMaker, fresh_maker, spec_of
 from pbcs_ompl.resettable.make import fresh_env
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule, rule_text
@@ -48,7 +49,8 @@ def task_of(env: str | EnvSpec | gymnasium.Env[Any, Any] | ResettableModel, env_
         return Task(replace(spec_of(env), **given), fresh_maker(env, max_episode_steps))
     if given:
         raise InvalidOption(f"{', '.join(given)}: this model is built already; give them to pbcs_ompl.make")
-    return Task(env.spec, env.make_env)
+    model = adapt_without_copy(env)  # refuses what is none
+    return Task(model.spec, model.make_env)
 
 
 def _of_spec(spec: EnvSpec) -> Task:

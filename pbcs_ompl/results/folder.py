@@ -193,12 +193,16 @@ def find_folders(root: Path) -> list[Path]:
     Raises:
         RunFolderError: there is no such folder, or no result in it.
     """
-    if not root.is_dir():
-        raise RunFolderError(f"{root} is not a folder")
-    found = sorted(_walk(root))
+    try:
+        found = root.is_dir()
+    except OSError as error:
+        raise RunFolderError(f"{root} cannot be read: {error.strerror}") from error
     if not found:
+        raise RunFolderError(f"{root} is not a folder")
+    folders = sorted(_walk(root))
+    if not folders:
         raise RunFolderError(f"no results in {root}: neither it nor a folder below has a {CONFIG}")
-    return found
+    return folders
 
 
 def _walk(root: Path) -> Iterator[Path]:

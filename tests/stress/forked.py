@@ -58,6 +58,7 @@ def _child(function, write, seconds, folder):
         os.dup2(write, 1)
         os.dup2(write, 2)
         sys.stdout, sys.stderr = (os.fdopen(number, "w", errors="backslashreplace") for number in (1, 2))
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)  # in place of that of pytest-timeout
         signal.alarm(int(seconds) + 1)
         used = int(Path("/proc/self/statm").read_text("utf-8").split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (used + MEGABYTES * 10**6,) * 2)

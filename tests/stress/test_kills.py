@@ -71,7 +71,7 @@ def kill(verb, out, seconds, number):
     except subprocess.TimeoutExpired:
         children = psutil.Process(process.pid).children(recursive=True)
         process.send_signal(number)
-        error = process.communicate(timeout=60)[1]
+        error = process.communicate(timeout=120)[1]
         assert process.returncode in (128 + number, -number, 0, 1), error
         assert "Traceback" not in error or process.returncode == -number, error  # before it could listen
         assert psutil.wait_procs(children, timeout=10)[1] == []
@@ -94,7 +94,7 @@ def check_whole(out):
 
 def finish(verb, out):
     process = start(continued(verb, out), out.parent)
-    error = process.communicate(timeout=120)[1]
+    error = process.communicate(timeout=600)[1]
     assert process.returncode in (0, 1), error
 
 

@@ -86,7 +86,7 @@ def test_odd_arguments_meet_named_errors(chain, tmp_path):
         function, base, _ = FUNCTIONS[name]
         arguments = base | {slot: VALUES[value]}
         arguments = {key: chain if one is CHAIN else one for key, one in arguments.items()}
-        ended = call(named(lambda f=function, a=arguments: f(**a)), seconds=20, folder=tmp_path)
+        ended = call(named(lambda f=function, a=arguments: f(**a)), seconds=60, folder=tmp_path)
         found[ended.status] += 1
         if ended.status != NAMED:
             raw.append(f"{name}({slot}={value}): status {ended.status}: {ended.text[-600:]}")
