@@ -100,7 +100,7 @@ def make_propagator(model: ResettableModel, callbacks: CallbackState, read: Read
             counter.count += 1
             controls = read_control(control)
             reached = step(values, controls)
-            if reached == []:  # the episode is over: nobody goes on from there
+            if reached == []:  # the episode is over
                 callbacks.reached = None
                 write(result, [nan] * len(values))
                 return

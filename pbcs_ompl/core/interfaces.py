@@ -71,7 +71,7 @@ class ResettableModel(Protocol):
     def step_one(self, state: list[float], control: list[float]) -> list[float]:
         """Advance one state, given and returned as a list of D floats: the fast path of a single propagation.
 
-        Empty where the episode ends there and is no success: nobody goes on from there.
+        Empty where the episode ends there and is no success; that state has no successors.
         """
         ...
 

@@ -36,7 +36,7 @@ class Transition(NamedTuple):
 
     @property
     def ended(self) -> BoolArray:
-        """Whether the episode is over in the next state [B], for whatever reason. Nobody goes on from there."""
+        """Whether the episode is over in the next state [B], for whatever reason. Such a state has no successors."""
         return self.terminated if self.truncated is None else self.terminated | self.truncated
 
 

@@ -142,7 +142,7 @@ class Judge:
 
 
 class _Episode:
-    """An episode that goes on: the last outcome, and what has been seen so far."""
+    """An episode in progress: the last outcome, and what has been seen so far."""
 
     def __init__(self, env: gymnasium.Env[Any, Any], spec: EnvSpec, rule: GoalRule, reset_seed: int | None):
         self.env, self._rule = env, rule

@@ -150,7 +150,7 @@ class SkillTrainer:
         """Return an activation set as a set of observations.
 
         Where the observation shows what the distance is made of, that is a ball, with the network of a learnt set. Else
-        a network learns to tell the states of the set from others along the plan.
+        a network learns to separate the states of the set from others along the plan.
 
         Args:
             start_index: The waypoint in its middle.

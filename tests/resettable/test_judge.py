@@ -79,7 +79,7 @@ def executed(env, actions, seed):
 
 @pytest.mark.parametrize("planner", ["Ex", "RRTNH", "ESTAdapted", "RRT", "KPIECE1", "EST"])
 @pytest.mark.parametrize("env_id", ["Ring-v0", "RingState-v0"])
-def test_no_plan_goes_on_where_an_episode_was_over(env_id, planner):
+def test_no_plan_continues_after_the_end_of_an_episode(env_id, planner):
     result = plan(env_id, planner, seed=0, max_transitions=3_000 if env_id == "Ring-v0" else 30_000)
     if env_id == "RingState-v0" and planner in ("Ex", "RRTNH"):
         assert result.solved, result.reason
