@@ -14,8 +14,10 @@ from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap, copied
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
+from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.observations import flat
-from pbcs_ompl.resettable.rules import Outcome
+from pbcs_ompl.resettable.observing import state_observer
+from pbcs_ompl.resettable.rules import Outcome, reported_success
 from pbcs_ompl.resettable.supported import TaskMaker
 
 SHORT, LONG = 12, 60
@@ -149,9 +151,10 @@ class _Branching:
 
     def _observed(self, states: list[Array]) -> Iterator[str]:
         """Compare the observations of restored states."""
-        if not isinstance(self._env, RestorableEnv | SuccessFlagEnv):
+        observe = state_observer(self._env, EnvAttributes.of(self._env))
+        if observe is None:
             return
-        rows = self._env.observe(np.array(states))
+        rows = observe(np.array(states))
         for step, (row, moment) in enumerate(zip(rows, self._one[1], strict=False)):
             index = _first_index(moment.observation, flat(row))
             yield f"observation{index} of the restored state of step {step}" if index is not None else ""
@@ -206,7 +209,7 @@ def _kept(value: Any) -> Any:
 def _success(env: Any, outcome: Outcome) -> bool:
     if isinstance(env, RestorableEnv):
         return env.is_success(outcome)
-    return bool(outcome.info.get("is_success", outcome.info.get("success", outcome.terminated)))
+    return reported_success(outcome)
 
 
 def _first_index(one: Any, other: Any) -> str | None:
