@@ -1,6 +1,8 @@
 """One environment of the survey, in this process: `python -m pbcs_ompl.resettable.survey_one MODULE:ID FILE`."""
 
+import os
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -69,5 +71,18 @@ def restore_cost(model: Any) -> float:
     return round(1e6 * float(np.median(costs)), 1)
 
 
+def _end_with_parent() -> None:
+    """End this process, whatever it does, when the survey is gone."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
 if __name__ == "__main__":
+    _end_with_parent()
     write_json(Path(sys.argv[2]), classify(sys.argv[1]))
