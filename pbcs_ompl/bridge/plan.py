@@ -260,7 +260,7 @@ def _new_folder(out: str | Path | None, config: dict[str, Any]) -> Iterator[RunF
                 (folder.path / name).unlink(missing_ok=True)
             folder.close()
             if not existed:
-                with suppress(OSError):  # somebody else has removed it, or put something there
+                with suppress(OSError):  # others have removed it, or put something there
                     folder.path.rmdir()
             raise
 

@@ -10,7 +10,7 @@ from pbcs_ompl.core.errors import PbcsError
 
 
 class OutputClosed(Exception):
-    """Nobody reads the standard output any more, as after `pbcs doctor | head -1`."""
+    """The reader of the standard output has gone, as after `pbcs doctor | head -1`."""
 
 
 def survive_encodings() -> None:
@@ -40,7 +40,7 @@ def flush_output() -> None:
 
 
 def print_error(*lines: str) -> None:
-    """Print lines on the standard error; where that is gone, nobody is there to be told."""
+    """Print lines on the standard error, if it is still there."""
     with suppress(OSError, ValueError):
         print(*lines, sep="\n", file=sys.stderr, flush=True)
 

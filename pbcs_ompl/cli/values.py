@@ -7,6 +7,7 @@ from typing import Any
 
 from pbcs_ompl.core.errors import did_you_mean
 from pbcs_ompl.core.text_values import parse_json, shortened
+from pbcs_ompl.core.utf8 import joined
 
 EXPECTED_OBJECT = "expected a JSON object such as '{\"size\": 5}'"
 
@@ -68,7 +69,7 @@ def part(text: str) -> tuple[int, int]:
 def json_object(text: str) -> dict[str, Any]:
     """Read a JSON object."""
     try:
-        value = parse_json(text)
+        value = parse_json(joined(text))
     except ValueError as error:
         raise ArgumentTypeError(f"{EXPECTED_OBJECT}, got {shortened(text)!r}: {error}") from error
     if not isinstance(value, dict):

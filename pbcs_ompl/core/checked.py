@@ -2,13 +2,12 @@
 
 import inspect
 import reprlib
+import sys
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cache, wraps
 from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
-
-import numpy as np
 
 from pbcs_ompl.core.errors import InvalidOption
 
@@ -78,7 +77,7 @@ def fits(value: Any, hint: Any) -> bool:
         return isinstance(value, origin) and all(
             fits(key, parameters[0]) and fits(item, parameters[1]) for key, item in value.items())
     if origin is not None and issubclass(origin, Sequence) and origin is not tuple:
-        listed = isinstance(value, origin | np.ndarray) and not isinstance(value, str | bytes)
+        listed = isinstance(value, (origin, *_of_numpy("ndarray"))) and not isinstance(value, str | bytes)
         return listed and all(fits(item, parameters[0]) for item in value)
     return _has_class(value, origin or hint)
 
@@ -87,10 +86,20 @@ def _has_class(value: Any, kind: Any) -> bool:
     if kind is Callable:
         return callable(value)
     if kind in NUMBERS:
-        return isinstance(value, NUMBERS[kind]) and not isinstance(value, bool | np.bool_)
+        return isinstance(value, NUMBERS[kind]) and not _is_bool(value)
     if kind is bool:
-        return isinstance(value, bool | np.bool_)
+        return _is_bool(value)
     return isinstance(value, kind)
+
+
+def _is_bool(value: Any) -> bool:
+    return isinstance(value, (bool, *_of_numpy("bool_")))
+
+
+def _of_numpy(name: str) -> tuple[type, ...]:
+    """Return a type of NumPy, where that is imported: the command line needs none for its help."""
+    numpy = sys.modules.get("numpy")
+    return () if numpy is None else (getattr(numpy, name),)
 
 
 def words(hint: Any) -> str:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 
 def scratch_folder() -> Path:
-    """Return a folder of this user that nobody else can write: the same each time, so that caches are of use.
+    """Return a folder of this user that no other user can write: the same each time, so that caches are of use.
 
-    What lies in it is executed, so one that somebody else has made is not used.
+    What lies in it is executed, so one that another user has made is not used.
 
     Raises:
         OSError: there is no folder for temporary files that can be written.

@@ -17,3 +17,11 @@ def utf8(text: str) -> bytes:
     except UnicodeEncodeError as error:
         raise InvalidOption(f"{text[error.start:error.end]!a} is half a character, which no file can hold; expected "
                             "text") from error
+
+
+def joined(text: str) -> str:
+    """Return a word of the command line whose characters the locale lacks, and Python therefore gave byte by byte."""
+    try:
+        return text.encode("utf-8", "surrogateescape").decode("utf-8", "surrogateescape")
+    except UnicodeEncodeError:  # another lone surrogate
+        return text

@@ -17,7 +17,7 @@ from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.observing import state_observer
-from pbcs_ompl.resettable.rules import Outcome, reported_success
+from pbcs_ompl.resettable.rules import Outcome
 from pbcs_ompl.resettable.supported import TaskMaker
 
 SHORT, LONG = 12, 60
@@ -150,13 +150,17 @@ class _Branching:
             yield "" if index is None else f"state{index} at step {step} of single steps, each from a restored state"
 
     def _observed(self, states: list[Array]) -> Iterator[str]:
-        """Compare the observations of restored states."""
+        """Compare the observations of restored states; those that an author computes, in float32 or a shorter type."""
         observe = state_observer(self._env, EnvAttributes.of(self._env))
         if observe is None:
             return
+        kind = np.dtype(np.float64 if isinstance(self._env, RestorableEnv) else np.float32)
+        space = self._env.observation_space
+        if isinstance(self._env, SuccessFlagEnv) and space.dtype is not None and space.dtype.kind == "f":
+            kind = min(kind, space.dtype, key=lambda dtype: dtype.itemsize)
         rows = observe(np.array(states))
         for step, (row, moment) in enumerate(zip(rows, self._one[1], strict=False)):
-            index = _first_index(moment.observation, flat(row))
+            index = _first_index(moment.observation.astype(kind), flat(row).astype(kind))
             yield f"observation{index} of the restored state of step {step}" if index is not None else ""
 
     def _steps(self, sequence: tuple[list[Any], list[Moment]], at: int, states: list[Array],
@@ -209,7 +213,7 @@ def _kept(value: Any) -> Any:
 def _success(env: Any, outcome: Outcome) -> bool:
     if isinstance(env, RestorableEnv):
         return env.is_success(outcome)
-    return reported_success(outcome)
+    return bool(outcome.info.get("is_success", outcome.info.get("success", outcome.terminated)))
 
 
 def _first_index(one: Any, other: Any) -> str | None:

@@ -11,6 +11,7 @@ from typing import Any
 from unicodedata import category
 
 from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.formatting import is_printable
 from pbcs_ompl.core.plain import plain
 
 Words = list[str]
@@ -136,7 +137,8 @@ def _json_words(option: str, values: dict[str, Any]) -> Words:
 
 
 def _json(values: dict[str, Any]) -> str:
-    return json.dumps(values, default=plain, ensure_ascii=False)
+    text = json.dumps(values, default=plain, ensure_ascii=False)
+    return text if is_printable(text) else json.dumps(values, default=plain)
 
 
 def _budgets(config: dict[str, Any]) -> Words:

@@ -200,7 +200,7 @@ def _read(path: Path, load: Callable[[], Content]) -> Content:
 
 def to_json(value: Any) -> str:
     """Return a value as JSON; NumPy values and paths become plain ones."""
-    return json.dumps(value, indent=2, default=plain) + "\n"
+    return json.dumps(value, indent=2, default=plain, ensure_ascii=False) + "\n"
 
 
 def to_toml(table: dict[str, Any]) -> str:

@@ -108,7 +108,7 @@ def start_run(path: Path, config: dict[str, Any], *, may_change: tuple[str, ...]
     Args:
         path: The folder.
         config: The settings; see `RunFolder.write_config`.
-        may_change: Settings that do not tell two runs apart.
+        may_change: Settings in which equal runs may differ.
         parts: The files of such a run, which are removed: it is made again.
 
     Raises:

@@ -141,4 +141,3 @@ def evaluate_chain(chain: SkillChain, task: Task, *, episodes: int, epsilon: flo
     executions = judge.drive(chain.controller(), reset_seeds=[chain.reset_seed] * episodes, max_steps=chain.time_limit,
                              epsilon=epsilon, seed=seed)
     return Evaluation.of(executions, epsilon)
-MOST_EPISODES = 1_000_000

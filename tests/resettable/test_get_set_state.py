@@ -55,7 +55,7 @@ def test_a_cart_is_a_model() -> None:
     np.testing.assert_array_equal(result.success, [True, False])
     assert model.step_one([0.0, 0.5, 0.0], [1.0]) == result.states[0].tolist()
     np.testing.assert_array_equal(model.is_valid(np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [np.nan, 0.0, 0.0],
-                                                           [0.0, 0.0, 0.5]])), [True, False, False, False])
+                                                           [0.0, 0.0, 1.5]])), [True, False, False, False])
 
 
 def test_success_is_a_function_of_the_state() -> None:

@@ -18,7 +18,7 @@ from pbcs_ompl.resettable.branching import LONG, first_difference
 from pbcs_ompl.resettable.memory.code import names_of
 from pbcs_ompl.resettable.memory.memory import GUARD_EVERY
 from pbcs_ompl.resettable.memory.plain_values import enum_name, from_text, pack, same, size_for, to_text, unpack
-from tests.resettable.toys import Cart, Line, push_on
+from tests.resettable.toys import Cart, Line, walk
 
 
 class Phase(Enum):
@@ -233,7 +233,7 @@ def test_what_grows_is_refused_when_it_is_too_long() -> None:
             self.data.ctrl[0] = np.sin(sum(self.trail))
 
     with pytest.raises(NotResettable, match=r"attribute 'trail'.*it grows"):
-        push_on(Growing(), 2000, 0.123456789)
+        walk(Growing, 2000, 0.123456789)
 
 
 def test_a_log_that_is_never_read_is_no_state() -> None:
@@ -261,7 +261,7 @@ def test_what_code_does_not_show_is_refused_when_it_changes() -> None:
                 vars(self)["mo" + "de"] = 1
 
     with pytest.raises(NotResettable, match="attribute 'mode' has changed"):
-        push_on(Sly(), 2 * GUARD_EVERY, 1.0)
+        walk(Sly, 2 * GUARD_EVERY, 1.0)
 
 
 def test_names_in_code() -> None:

@@ -83,9 +83,9 @@ class Cart(gymnasium.Env):
         return 0.0
 
 
-def push_on(env: gymnasium.Env, steps: int, control: float) -> None:
-    """Adapt an environment and push it one way, each step from the state that the last one led to."""
-    model = adapt(env)
+def walk(kind: Any, steps: int, control: float) -> None:
+    """Adapt an environment and make steps in it, each from the state before."""
+    model = adapt(kind())
     state = model.initial_state(0)
     for _ in range(steps):
         state = model.transition(state[None], np.full((1, 1), control)).states[0]

@@ -13,7 +13,7 @@ from stress.forked import call
 
 from pbcs_ompl import cli
 
-COUNT, SEED, SECONDS = 400, int(os.environ.get("SEED_X", 20261127)), 20
+COUNT, SEED, SECONDS = 400, int(os.environ.get("STRESS_SEED", 20261127)), 20
 MAZE = ["--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 2}']
 FEW = ["--max-transitions", "300"]
 VERBS = {

@@ -53,7 +53,7 @@ def test_the_verb_reports_every_folder(copy, capsys):
     assert outcomes["given"][1] == "not solved"
     page = Page(copy / "runs/report.html")
     for said in ("1 < 0 & <b>bold</b>", "1/3 = 33.3% (95 % interval 6.1% to 79.2%)",
-                 "ZeroDivisionError: division by zero", "cannot build SST", "the budget of 1200 transitions is used up",
+                 "ZeroDivisionError: division by zero", "cannot build SST", "the budget of 4000 transitions is used up",
                  'control_duration = 2', "Study coin-toss", "numpy", "torch", "logical cores"):
         assert said in page.text, said
     assert page.tags.count("img") == len(list(copy.rglob("*.png")))

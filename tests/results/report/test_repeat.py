@@ -71,8 +71,8 @@ def test_a_training(laboratory, call, name):
 
 
 def test_an_evaluation(laboratory, call):
-    (chain, model), options = call(repeating(read_folder(Path("runs/evaluation"))))
-    again = {"kind": "eval", "environment": model.spec.to_dict(), "chain": "runs/training", **options}
+    (chain,), options = call(repeating(read_folder(Path("runs/evaluation"))))
+    again = {"kind": "eval", "environment": chain.environment.to_dict(), "chain": "runs/training", **options}
     assert again == settings(Path("runs/evaluation"))
     assert len(chain.skills) > 0
 
@@ -109,7 +109,7 @@ def test_a_study_and_one_that_was_changed(laboratory, call, monkeypatch, tmp_pat
 
 def test_what_has_not_ended_can_go_on(laboratory, call, monkeypatch):
     assert resuming(read_folder(Path("runs/training"))) == ""
-    assert resuming(read_folder(Path("runs/given"))) == "pbcs train --resume runs/given --max-transitions 2400"
+    assert resuming(read_folder(Path("runs/given"))) == "pbcs train --resume runs/given --max-transitions 8000"
     for name in ("comparison", "study"):
         folder = read_folder(Path("runs") / name)
         assert resuming(folder) == ""

@@ -1,0 +1,134 @@
+"""The commands in hostile surroundings: closed pipes, full disks, locales, backends, no home, code that raises."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PBCS = [sys.executable, "-m", "pbcs_ompl.cli"]
+PLAN = ["plan", "--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 2}']
+ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": ""}
+RAISING = """
+import gymnasium, numpy as np
+
+class Odd(Exception):
+    def __str__(self):
+        raise RuntimeError("no words")
+
+ERRORS = {{"value": ValueError("two\\nlines"), "odd": Odd(), "exit": SystemExit(0)}}
+
+class Raising(gymnasium.Env):
+    action_space = gymnasium.spaces.Box(-0.1, 0.1, (2,))
+    observation_space = gymnasium.spaces.Box(-1, 1, (2,))
+
+    def __init__(self, where="", what="value"):
+        self.where, self.error = where, ERRORS[what]
+        self.maybe("init")
+
+    def maybe(self, here):
+        if here == self.where:
+            raise self.error
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.maybe("reset")
+        self.at = np.zeros(2, np.float32)
+        return self.at.copy(), {{}}
+
+    def step(self, action):
+        self.maybe("step")
+        self.at = np.clip(self.at + action, -1, 1).astype(np.float32)
+        return self.at.copy(), 0.0, False, False, {{}}
+
+gymnasium.register("Raising-v0", Raising)
+"""
+
+
+def run(words, folder, **settings):
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(folder)]), **settings.pop("env", {})}
+    return subprocess.run([*PBCS, *words], cwd=folder, env=environment, stdout=settings.pop("stdout", subprocess.PIPE),
+                          stderr=subprocess.PIPE, text=True, errors="replace", timeout=200, **settings)
+
+
+def test_a_closed_pipe_ends_quietly(tmp_path):
+    read, write = os.pipe()
+    os.close(read)
+    ended = run([*PLAN, "--out", "out"], tmp_path, stdout=write)
+    os.close(write)
+    assert (ended.returncode, ended.stderr) == (141, "")
+    assert (tmp_path / "out/result.json").exists()
+
+
+@pytest.mark.parametrize("words", [["--help"], ["plan", "--help"], ["--version"], ["study", "--list"]])
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_is_one_line(words, tmp_path):
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        ended = run(words, tmp_path, stdout=full)
+    assert (ended.returncode, ended.stderr.count("\n")) == (2, 1)
+    assert ended.stderr.startswith("pbcs: error: cannot write to the standard output: No space left")
+
+
+def test_pictures_need_no_backend(tmp_path):
+    ended = run([*PLAN, "--out", "out", "--json"], tmp_path, env={"MPLBACKEND": "module://no_such.backend"})
+    assert (ended.returncode, ended.stdout.count("\n")) == (0, 1)
+    assert (tmp_path / "out/tree.png").exists()
+
+
+@pytest.mark.parametrize("name", [b"folder-\xc3\xbc", b"folder-\xe9"])
+def test_any_locale_and_any_name_of_a_folder(name, tmp_path):
+    out = tmp_path / os.fsdecode(name)
+    words = ["compare", "--planners", "Ex", "--env", "pbcs/Maze-v0", "--seeds", "1", "--env-kwargs",
+             '{"layout": ["+-+-+", "|é  |", "+-+ +", "|   |", "+-+-+"]}', "--out", os.fsencode(out)]
+    for _ in range(2):
+        ended = run(words, tmp_path, env=ASCII)
+        assert ended.returncode == 0, ended.stderr
+    assert run(["report", os.fsencode(out)], tmp_path, env=ASCII).returncode == 0
+    assert "é" in (out / "report.html").read_text("utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("setpriv") is None, reason="needs setpriv")
+def test_a_read_only_installation_without_a_home(tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(ROOT, copy, symlinks=True,
+                    ignore=shutil.ignore_patterns("__pycache__", ".git", ".venv", "runs", "tests", "docs"))
+    subprocess.run(["chmod", "-R", "a-w", copy], check=True)
+    environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1", "HOME": "/proc/nope"}
+    for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"):
+        environment.pop(name, None)
+    drop = "-dac_override,-dac_read_search"
+    ended = subprocess.run(["setpriv", f"--bounding-set={drop}", "--inh-caps=-dac_override", *PBCS, *PLAN, "--out",
+                            str(tmp_path / "out")], cwd=tmp_path, env=environment, capture_output=True, text=True)
+    subprocess.run(["chmod", "-R", "u+w", copy], check=True)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stderr.count("warning") == 1
+    assert ended.stderr.startswith("pbcs: warning: neither the installation nor the home can be written")
+
+
+@pytest.mark.parametrize("verb", ["plan", "train", "compare"])
+@pytest.mark.parametrize(("where", "what", "message"), [
+    ("init", "value", "ValueError: two lines"), ("reset", "odd", "raised Odd: its message cannot be read"),
+    ("step", "exit", "raised SystemExit: 0")])
+def test_code_that_raises_is_one_line_and_status_2(verb, where, what, message, tmp_path):
+    (tmp_path / "raising.py").write_text(RAISING.format(), "utf-8")
+    planners = ["--planners", "Ex"] if verb == "compare" else []
+    ended = run([verb, *planners, "--env", "raising:Raising-v0", "--goal", "obs[0]>0.5", "--env-kwargs",
+                 f'{{"where": "{where}", "what": "{what}"}}'], tmp_path)
+    assert ended.returncode == 2
+    assert ended.stderr.splitlines()[-1].startswith("pbcs: error: ")
+    assert message in ended.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize("words", [["plan", "--env", "broken:A-v0"], ["doctor", "--env", "broken:A-v0"],
+                                   [*PLAN, "--planner", "broken:A"],
+                                   ["train", *PLAN[1:], "--agent", "broken:A"]])
+@pytest.mark.parametrize("text", ["raise RuntimeError('boom')", "raise SystemExit(0)"])
+def test_a_module_that_raises_when_it_is_imported(words, text, tmp_path):
+    (tmp_path / "broken.py").write_text(text, "utf-8")
+    ended = run(words, tmp_path)
+    assert (ended.returncode, ended.stderr.count("\n")) == (2, 1)
+    assert "RuntimeError: boom" in ended.stderr or "SystemExit: 0" in ended.stderr

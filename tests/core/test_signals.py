@@ -1,0 +1,57 @@
+"""SIGTERM and SIGHUP ask to stop as Ctrl-C does; handlers of a host application stay."""
+
+import os
+import signal
+import threading
+
+import pytest
+
+from pbcs_ompl.core.signals import STOPPING, interruptible, signal_of, signals_interrupt, with_remedy
+
+
+@pytest.mark.parametrize("number", STOPPING)
+def test_the_first_signal_is_noted_and_the_second_raises(number):
+    seen = []
+    with pytest.raises(KeyboardInterrupt) as caught, signals_interrupt(), interruptible(seen.append):  # noqa: PT012
+        os.kill(os.getpid(), number)
+        assert [signal_of(error) for error in seen] == [number]
+        os.kill(os.getpid(), number)
+    assert signal_of(caught.value) == number
+
+
+@pytest.mark.parametrize("number", STOPPING)
+def test_elsewhere_it_raises_at_once(number):
+    with pytest.raises(KeyboardInterrupt) as caught, signals_interrupt():
+        os.kill(os.getpid(), number)
+    assert signal_of(with_remedy(caught.value, "go on")) == number
+    assert str(with_remedy(caught.value, "go on")) == "go on"
+
+
+@pytest.mark.parametrize("handler", [signal.SIG_IGN, lambda *_: None])
+def test_what_others_have_chosen_stays(handler):
+    before = signal.signal(signal.SIGTERM, handler)
+    try:
+        with signals_interrupt(), interruptible(pytest.fail):
+            os.kill(os.getpid(), signal.SIGTERM)
+            assert signal.getsignal(signal.SIGTERM) is handler
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_handlers_are_given_back():
+    before = [signal.getsignal(number) for number in STOPPING]
+    with signals_interrupt(), interruptible(pytest.fail):
+        pass
+    assert [signal.getsignal(number) for number in STOPPING] == before
+
+
+def test_another_thread_changes_nothing():
+    def work():
+        with signals_interrupt(), interruptible(pytest.fail):
+            found.append([signal.getsignal(number) for number in STOPPING])
+
+    found, before = [], [signal.getsignal(number) for number in STOPPING]
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert found == [before]
