@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.errors import InvalidOption, MissingDependency, NotResettable, UnsupportedSpace
+from pbcs_ompl.core.errors import MissingDependency, NotResettable, PbcsError, UnsupportedSpace
 from pbcs_ompl.resettable.adapters.visited import VisitedEnv
 from pbcs_ompl.resettable.check import check_resettable
 from pbcs_ompl.resettable.make import make
@@ -34,7 +34,7 @@ def _classify(env_id: str) -> Record:
         return nothing("not installed", str(error))
     except (NotResettable, UnsupportedSpace) as error:
         return nothing("refused", str(error))
-    except InvalidOption as error:
+    except PbcsError as error:
         return nothing("failed", str(error))
     except ModuleNotFoundError as error:
         return nothing("not installed", str(error))
