@@ -33,7 +33,8 @@ NUMBERED = re.compile(r"(.*)-v(\d+)")
 def registered() -> dict[str, str]:
     """Return the ids of all environments that are registered here, each with the module that registers it.
 
-    Of several versions the latest is taken. The ids of one package alternate with those of others.
+    Of several versions the latest is taken; those that only have vector environments are left out. The ids of one
+    package alternate with those of others.
     """
     load_environments()
     found = {name: "gymnasium" for name in gymnasium.registry if not name.startswith("pbcs/")}
@@ -47,7 +48,8 @@ def registered() -> dict[str, str]:
         found |= {name: module for name in gymnasium.registry if name not in found}
     groups: dict[str, list[str]] = defaultdict(list)
     for name in _latest(found):
-        groups[found[name]].append(name)
+        if gymnasium.registry[name].entry_point is not None:
+            groups[found[name]].append(name)
     order = chain.from_iterable(zip_longest(*groups.values()))
     return {name: found[name] for name in order if name is not None}
 

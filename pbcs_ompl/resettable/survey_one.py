@@ -1,13 +1,15 @@
 """One environment of the survey, in this process: `python -m pbcs_ompl.resettable.survey_one MODULE:ID FILE`."""
 
+import os
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.errors import InvalidOption, MissingDependency, NotResettable, UnsupportedSpace
+from pbcs_ompl.core.errors import MissingDependency, NotResettable, PbcsError, UnsupportedSpace
 from pbcs_ompl.resettable.adapters.visited import VisitedEnv
 from pbcs_ompl.resettable.check import check_resettable
 from pbcs_ompl.resettable.make import make
@@ -32,7 +34,7 @@ def _classify(env_id: str) -> Record:
         return nothing("not installed", str(error))
     except (NotResettable, UnsupportedSpace) as error:
         return nothing("refused", str(error))
-    except InvalidOption as error:
+    except PbcsError as error:
         return nothing("failed", str(error))
     except ModuleNotFoundError as error:
         return nothing("not installed", str(error))
@@ -69,5 +71,18 @@ def restore_cost(model: Any) -> float:
     return round(1e6 * float(np.median(costs)), 1)
 
 
+def _end_with_parent() -> None:
+    """End this process, whatever it does, when the survey is gone."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
 if __name__ == "__main__":
+    _end_with_parent()
     write_json(Path(sys.argv[2]), classify(sys.argv[1]))

@@ -37,6 +37,7 @@ WORDS = {
 PATTERN = re.compile(r"\b(" + "|".join(WORDS) + r")\b", re.IGNORECASE)
 ALLOWED = {
     "tests/docs/test_words.py": WORDS.keys(),
+    "docs/environments_table.md": WORDS.keys(),  # ids and messages of others
 }
 
 
