@@ -11,12 +11,13 @@ STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test slow check bench clean
+.PHONY: help setup demo test slow stress check bench clean
 
 help:
 	@echo "make demo    install, train a skill chain on a 5x5 maze, show the result"
 	@echo "make test    install, run the tests, show the maze solve rates"
 	@echo "make slow    the tests that take minutes"
+	@echo "make stress  kills, damaged files, bad inputs: half an hour"
 	@echo "make check   lint, types, direction of imports"
 	@echo "make bench   measure what the README's table states (takes long)"
 	@echo "make setup   only prepare $(VENV)"
@@ -39,7 +40,10 @@ test: setup
 	$(BIN)/python -m pytest -n $(WORKERS)
 
 slow: setup
-	$(BIN)/python -m pytest -n $(WORKERS) -m slow
+	$(BIN)/python -m pytest -n $(WORKERS) -m slow --ignore=tests/stress
+
+stress: setup
+	$(BIN)/python -m pytest -m slow -s tests/stress
 
 check: setup
 	$(BIN)/ruff check

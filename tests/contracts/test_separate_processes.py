@@ -90,6 +90,6 @@ def test_every_step_works_in_a_new_process(family: str, tmp_path: Path) -> None:
                          "--settings", '{"radius": 0.3}')
     assert found["plan_transitions"] == 0
     if (tmp_path / "chain" / "chain").is_dir():
-        assert pbcs("eval", "chain", "--episodes", "2", "--out", "evaluation")[1]["episodes"] == 2
+        assert pbcs("eval", "chain", "--trust", "--episodes", "2", "--out", "evaluation")[1]["episodes"] == 2
     status, found = pbcs("report", ".")
     assert found["damaged"] == {}

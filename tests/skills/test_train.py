@@ -73,7 +73,8 @@ class StopAfter:
 def test_a_training_that_was_stopped_or_killed_resumes_bit_for_bit(tmp_path, number):
     """A Ctrl-C may happen anywhere within a step, which is finished first; a kill goes back to the last checkpoint."""
     whole = train("pbcs/Maze-v0", env_kwargs={"size": 3}, seed=1)
-    script = ("import sys; from pbcs_ompl.skills import train, training; training.CHECKPOINT_SECONDS = 0.05; "
+    script = ("import sys; from pbcs_ompl.skills import train, training; "
+              "training.CHECKPOINT_SECONDS = training.FIRST_CHECKPOINT_SECONDS = 0.05; "
               f"train('pbcs/Maze-v0', env_kwargs={{'size': 3}}, seed=1, out={str(tmp_path / 'run')!r}, "
               "on_progress=lambda numbers: print(numbers, flush=True))")
     child = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,

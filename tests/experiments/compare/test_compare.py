@@ -147,7 +147,7 @@ def test_control_c_stops_the_processes(misbehaving, tmp_path):
     ({"env": EnvSpec(MAZE), "env_kwargs": {"size": 2}}, InvalidOption, "has its options already"),
     ({"env": EnvSpec("pbcs/Mase-v0")}, UnknownName, "did you mean"),
     ({"planners": [RRT, RRT]}, InvalidOption, "twice"),
-    ({"seeds": 0}, InvalidOption, "no seeds"),
+    ({"seeds": 0}, InvalidOption, "seeds is 0"),
     ({"seeds": [1, 1]}, InvalidOption, "twice"),
     ({"jobs": 0}, InvalidOption, "jobs is 0"),
     ({"max_transitions": 0}, InvalidOption, "max_transitions"),

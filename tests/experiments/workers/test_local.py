@@ -149,7 +149,7 @@ def test_no_runs_no_processes():
 
 
 @pytest.mark.parametrize(("make", "message"), [
-    (lambda: make_executor(0), "jobs is 0; expected at least 1"),
+    (lambda: make_executor(0), "jobs is 0; expected from 1"),
     (lambda: Limits(max_seconds=0.0), "max_seconds is 0.0; expected more than 0"),
     (lambda: Limits(max_memory=-1.0), "max_memory is -1.0; expected more than 0")])
 def test_limits_that_cannot_be_are_named(make, message):

@@ -126,7 +126,7 @@ def test_python_objects_have_no_command(laboratory, changes, name):
 
 
 words = st.text(st.characters(exclude_categories=["Cs", "Cc"]), min_size=1, max_size=6)
-values = st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=5)
+values = st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=5)
 options = st.dictionaries(words, values | st.lists(values, max_size=3), max_size=3)
 rules = st.fixed_dictionaries({}, optional={"goal": words, "feature": words, "start_seed": st.integers(0, 99)})
 
