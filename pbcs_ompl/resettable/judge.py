@@ -24,7 +24,7 @@ from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rules import GoalRule, Outcome, goal_rule, granted_success
 from pbcs_ompl.resettable.task_env import explored_actions
 
-SIDE_BY_SIDE = 20
+SIDE_BY_SIDE = 50
 """Episodes that a controller drives at the same time, each in an environment of its own."""
 Ending = Literal["goal", "terminated", "truncated", "end of the actions", "time limit"]
 

@@ -47,8 +47,10 @@ def granted_success(outcome: Outcome) -> bool:
     An environment with `goal_distance`, `goal_threshold` and `get_env_state` (see `attributes`) whose `info` says
     nothing is asked for the distance of the state that it is in.
     """
+    if "is_success" in outcome.info or "success" in outcome.info:
+        return reported_success(outcome)
     offered = EnvAttributes.of(outcome.env)
-    if "is_success" in outcome.info or "success" in outcome.info or offered.goal_distance is None:
+    if offered.goal_distance is None:
         return reported_success(outcome)
     state = np.array(outcome.env.get_env_state(), dtype=np.float64)
     return bool(offered.goal_distance(state[None])[0] < (offered.goal_threshold or 0.0))
