@@ -19,7 +19,7 @@ from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.checksums import changed_files
-from pbcs_ompl.results.files import CHECKPOINT, CONFIG, PLAN, RESULT, is_there, read_toml
+from pbcs_ompl.results.files import CHECKPOINT, CONFIG, PLAN, RESULT, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.config import TrainConfig, read_config
 from pbcs_ompl.skills.training import Training, TrainResult, training_versions
@@ -103,7 +103,7 @@ def resume(folder: str | Path, *, max_transitions: int | None = None, trust: boo
         UntrustedModule: the folder names a module, and is not trusted.
     """
     with RunFolder(folder, resume=True) as opened:
-        if is_there(opened.path / RESULT) and not is_there(opened.path / CHECKPOINT):
+        if _has_ended(opened.path):
             raise RunFolderError(f"the training in {opened.path} has ended; there is nothing to resume")
         environment, config, versions = read_config(opened.path / CONFIG, trust=trust)
         _warn_of_other_versions(opened.path, versions)
@@ -114,6 +114,14 @@ def resume(folder: str | Path, *, max_transitions: int | None = None, trust: boo
             config = replace(config, max_transitions=max_transitions)
             opened.write_config(read_toml(opened.path / CONFIG) | {"max_transitions": max_transitions})
         return Training(make(environment), config, opened, on_progress, True).run(None)
+
+
+def _has_ended(path: Path) -> bool:
+    """Return whether a larger budget changes nothing: one that ended before training began has no checkpoint."""
+    if not is_there(path / RESULT) or is_there(path / CHECKPOINT):
+        return False
+    complete: bool = read_json(path / RESULT, dict[str, Any]).get("complete", True)
+    return complete
 
 
 def _check_planner(model: ResettableModel, config: TrainConfig) -> None:

@@ -200,6 +200,16 @@ def test_wrong_options_are_named_before_a_folder_is_made(options, error, hint, t
     assert not (tmp_path / "run").exists()
 
 
+def test_a_search_that_used_up_its_budget_is_continued_with_a_larger_one(tmp_path):
+    short = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=1, max_transitions=50, out=tmp_path / "run")
+    assert (short.complete, short.plan_transitions) == (False, 50)
+    longer = resume(tmp_path / "run", max_transitions=1_500)
+    whole = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=1, max_transitions=1_500)
+    assert (longer.plan_transitions, longer.train_transitions, longer.reason) == (
+        whole.plan_transitions, whole.train_transitions, whole.reason)
+    assert longer.train_transitions > 0
+
+
 def test_folders_are_never_overwritten_and_damage_is_named(tmp_path):
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").write_text("years of work")
