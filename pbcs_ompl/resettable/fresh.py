@@ -1,7 +1,9 @@
 """Fresh environments of a task: made by Gymnasium from its id, or copied from an object before anything ran in it."""
 
+import json
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from copy import deepcopy
 from typing import Any
 
@@ -11,6 +13,7 @@ from gymnasium.wrappers import RepeatAction, TimeLimit
 
 from pbcs_ompl.core.callbacks import describe
 from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.plain import plain
 from pbcs_ompl.resettable.memory.owned import holds_resource
 
 EnvMaker = Callable[[], gymnasium.Env[Any, Any]]
@@ -95,10 +98,19 @@ def spec_of(env: gymnasium.Env[Any, Any]) -> EnvSpec:
     """
     name = type(env.unwrapped).__qualname__ if env.spec is None else env.spec.id
     for layer in getattr(env, "layers", ()):
-        name = f"{type(layer).__name__}({name})"
+        name = f"{_wrapper_name(layer)}({name})"
     if env.spec is None:
         return EnvSpec(name)
     registered = gymnasium.registry[env.spec.id].kwargs if env.spec.id in gymnasium.registry else {}
     return EnvSpec(name, {option: value for option, value in env.spec.kwargs.items() if option != "render_mode"
                           and (option not in registered or repr(value) != repr(registered[option]))})
 
+
+
+def _wrapper_name(layer: Any) -> str:
+    """Return a wrapper's class, with those of its arguments that are numbers, strings or arrays of them."""
+    given = []
+    for option, value in getattr(layer, "_saved_kwargs", {}).items():  # of gymnasium.utils.RecordConstructorArgs
+        with suppress(TypeError, ValueError):
+            given.append(f"{option}={json.dumps(value, default=plain, separators=(',', ':'))}")
+    return type(layer).__name__ + (f"[{','.join(given)}]" if given else "")
