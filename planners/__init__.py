@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pbcs_ompl.core.tree import Tree
+    from pbcs_ompl.planners.context import PlanningContext
     from pbcs_ompl.planners.est_adapted import ESTAdapted
     from pbcs_ompl.planners.ex import Ex
     from pbcs_ompl.planners.planner import Strategy, TreePlanner
-    from pbcs_ompl.planners.propagators import PlanningContext
     from pbcs_ompl.planners.random_walk import RandomWalk
     from pbcs_ompl.planners.rrt_nh import RRTNH
     from pbcs_ompl.planners.rrt_steered import RRTSteered
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["RRTNH", "ESTAdapted", "Ex", "PlanningContext", "RRTSteered", "RandomWalk", "Strategy", "Tree",
            "TreePlanner"]
 
-_MODULES = {"ESTAdapted": "planners.est_adapted", "Ex": "planners.ex", "PlanningContext": "planners.propagators",
+_MODULES = {"ESTAdapted": "planners.est_adapted", "Ex": "planners.ex", "PlanningContext": "planners.context",
             "RandomWalk": "planners.random_walk", "RRTNH": "planners.rrt_nh", "RRTSteered": "planners.rrt_steered",
             "Strategy": "planners.planner", "Tree": "core.tree", "TreePlanner": "planners.planner"}
 

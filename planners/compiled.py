@@ -20,6 +20,7 @@ _matrix = types.float64[:, ::1]
 _integers = types.int64[::1]
 STEP_SIGNATURE = types.Tuple((types.float64, types.boolean, types.boolean))(
     _vector, _matrix, _integers, _matrix, types.int64, _matrix, types.int64)
+PARAMETERS_TYPE = types.Tuple((_vector, _matrix, _integers))
 STEP_TYPE = types.FunctionType(STEP_SIGNATURE)
 """A first-class function, so that loops over steps are compiled once and cached, whatever the environment."""
 
@@ -52,10 +53,10 @@ class CompiledStrategy(Protocol):
     """A strategy that can expand many nodes, one after the other, in one compiled call."""
 
     def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:
-        """Expand `count` nodes, or until the goal; return the goal's node, or -1.
+        """Expand nodes by at least one step, at most `count`, or until the goal; return the goal's node, or -1.
 
-        The new nodes lie in the tree and the strategy knows them. An expansion that gives a state that is not
-        finite ends the call as well; that state is the tree's last.
+        The new nodes lie in the tree and the strategy knows them. A step to a state that is not finite ends the call
+        as well; that state is the tree's last.
         """
         ...
 
