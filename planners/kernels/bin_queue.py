@@ -87,7 +87,7 @@ def reserve(queue: BinQueue, count: int) -> BinQueue:
         most = max(GROWTH * len(queue.heads), bins + count)
         table = np.zeros(4 << (most - 1).bit_length(), np.int32)
         cells = resized_copy(queue.cells, bins, most)
-        _rehash(cells, table, bins)
+        rehash(cells, table, bins)
         queue = queue._replace(heads=resized_copy(queue.heads, bins, most), cells=cells, table=table,
                                order=resized_copy(queue.order, bins, most))
     rows = rows_needed(queue.used, count)
@@ -185,6 +185,7 @@ def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: Number) -> Number:
 
 
 @njit()
-def _rehash(cells: NDArray[np.int64], table: NDArray[np.int32], bins: int) -> None:
+def rehash(cells: NDArray[np.int64], table: NDArray[np.int32], bins: int) -> None:
+    """Put the first `bins` cells into an empty hash table."""
     for number in range(bins):
         table[find_cell(cells, table, cells[number])] = number + 1

@@ -3,10 +3,7 @@
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import Columns
@@ -14,31 +11,12 @@ from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, STEP_TYPE
 from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, grow_and_add
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
+from pbcs_ompl.planners.kernels.memory import prefetch, uncounted
 from pbcs_ompl.planners.kernels.runs import MEMBER, choose, peek
 
 _matrix = types.float64[:, ::1]
 _vector = types.float64[::1]
 _integers = types.int64[::1]
-
-
-@intrinsic
-def prefetch(typing_context: Any, array: Any, row: Any) -> Any:
-    """Fetch the first cache line of array[row] of a two-dimensional array into the cache; changes no value."""
-    signature = types.void(array, types.intp)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array_type = signature.args[0]
-        structure = context.make_array(array_type)(context, builder, arguments[0])
-        first = context.get_constant(types.intp, 0)
-        pointer = cgutils.get_item_pointer(context, builder, array_type, structure, [arguments[1], first])
-        byte, flag = ir.PointerType(ir.IntType(8)), ir.IntType(32)
-        function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag]), "llvm.prefetch.p0")
-        read, keep, data = (ir.Constant(flag, value) for value in (0, 3, 1))
-        builder.call(function, [builder.bitcast(pointer, byte), read, keep, data])
-        return context.get_dummy_value()
-
-    return signature, generate
 
 
 @njit(types.Tuple((types.int64, types.boolean))(
@@ -63,11 +41,11 @@ def expand(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims:
         How many nodes were written, and whether the last one is the goal. A state that is not finite ends the loop
         as well; it is the last one and not in the queue.
     """
-    # Fields of named tuples are counted references: in the loop they would cost more than the work.
-    reals, table, integers = parameters
-    states, features, controls, parents, rewards, ends = columns
-    pool, heads, order, head = queue.pool, queue.heads, queue.order, queue.head
-    cells, places = queue.cells, queue.table
+    reals, table, integers = uncounted(parameters[0]), uncounted(parameters[1]), uncounted(parameters[2])
+    states, features, controls = uncounted(columns.states), uncounted(columns.features), uncounted(columns.controls)
+    parents, rewards, ends = uncounted(columns.parents), uncounted(columns.rewards), uncounted(columns.terminal)
+    pool, heads, order = uncounted(queue.pool), uncounted(queue.heads), uncounted(queue.order)
+    head, cells, places = uncounted(queue.head), uncounted(queue.cells), uncounted(queue.table)
     least, longest = durations
     cell = np.empty(len(bin_size), np.int64)
     child, end = first, first + most

@@ -91,7 +91,8 @@ def test_bad_durations_of_a_strategy_are_named(solve, square, returned) -> None:
 
 
 def test_ompl_keeps_to_the_least_duration() -> None:
-    result = plan("pbcs/Maze-v0", "RRT", seed=1, max_transitions=100_000, planner_kwargs={"control_duration": [3, 6]}, **MAZE)
+    result = plan("pbcs/Maze-v0", "RRT", seed=1, max_transitions=100_000, planner_kwargs={"control_duration": [3, 6]},
+                  **MAZE)
     assert result.replay_ok
     assert result.trajectory is not None
     assert min(runs_of(result.trajectory.actions)) >= 3
