@@ -75,7 +75,7 @@ class Ex(Strategy):
         uniforms = self.rng.random((max(1, count // durations[1]), 2 + bounds.shape[1] + drawn))
         tree.reserve(count)
         self.queue = reserve(self.queue, count)
-        written, reached = ex_loop.expand(step.step, step[1:], feature_dims, bounds, durations, tree.columns,
+        written, reached = ex_loop.expand(step.parameters, feature_dims, bounds, durations, tree.columns,
                                           len(tree), count, self.queue, self._size, uniforms)
         tree.claim(written)
         return len(tree) - 1 if reached else -1

@@ -142,7 +142,7 @@ class ModelPropagator(BatchPropagator):
                          durations: IndexArray) -> int:
         first, most = len(tree), min(self.counter.left, int(durations.sum()))
         tree.reserve(most)
-        written, reached = batch_loop.expand(compiled.step, compiled[1:], self.feature_dims, tree.columns, first, most,
+        written, reached = batch_loop.expand(compiled.parameters, self.feature_dims, tree.columns, first, most,
                                              nodes, controls, durations)
         tree.claim(written)
         self.counter.count += written

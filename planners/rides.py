@@ -106,7 +106,7 @@ class Rides(Strategy):
         self._add_rides(1)
         self.regions = reserve(self.regions, count)
         written, reached = rides_loop.explore(
-            step.step, step[1:], feature_dims, self._bounds, tree.columns, len(tree), count, self.regions, self._size,
+            step.parameters, feature_dims, self._bounds, tree.columns, len(tree), count, self.regions, self._size,
             self.context.episode_steps, self._yields, self._rides, self._actions, self.rng)
         tree.claim(written)
         return len(tree) - 1 if reached else -1

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import GROWTH, resized_copy
+from pbcs_ompl.planners.kernels.memory import uncounted
 from pbcs_ompl.planners.kernels.runs import LENGTH, LOWEST, SIZE, START, Number, append, choose
 from pbcs_ompl.planners.kernels.slices import CLASSES, SMALLEST, double, rows_needed, take
 
@@ -61,7 +62,7 @@ QUEUE_TYPE = types.NamedTuple((_entries, _entries, _entries, _entries, _integers
 
 def empty_queue(num_features: int) -> BinQueue:
     """Return a queue without bins; its rows cost no memory until they are written to."""
-    bins, rows = 1 << 14, 1 << 16
+    bins, rows = 1 << 10, 1 << 14
     return BinQueue(
         pool=np.empty((rows, 3), np.int32), heads=np.empty((bins, 4), np.int32),
         order=np.empty((bins, 3), np.int32), head=np.zeros((1, 4), np.int32),
@@ -160,6 +161,7 @@ def grow_and_add(queue: BinQueue, cell: NDArray[np.int64], place: Number, node: 
 @njit()
 def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_],
             size: NDArray[np.float64], first: int) -> None:
+    queue = uncounted(queue)
     pool, heads, cells, table = queue.pool, queue.heads, queue.cells, queue.table
     cell = np.empty(features.shape[1], np.int64)
     for row in range(len(features)):

@@ -1,14 +1,12 @@
 """Ex as one compiled loop: select, draw a control, step, insert ([Matheron2020] Alg. 5, lines 7 to 12)."""
 
-from typing import Any
-
 import numpy as np
 from numba import types
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, STEP_TYPE
+from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, call_step
 from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, grow_and_add
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
 from pbcs_ompl.planners.kernels.memory import prefetch, uncounted
@@ -20,15 +18,15 @@ _integers = types.int64[::1]
 
 
 @njit(types.Tuple((types.int64, types.boolean))(
-    STEP_TYPE, PARAMETERS_TYPE, _integers, _matrix, types.UniTuple(types.int64, 2),
+    PARAMETERS_TYPE, _integers, _matrix, types.UniTuple(types.int64, 2),
     COLUMNS_TYPE, types.int64, types.int64, QUEUE_TYPE, _vector, _matrix))
-def expand(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
+def expand(parameters: tuple[int, Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
            durations: tuple[int, int], columns: Columns, first: int, most: int, queue: BinQueue, bin_size: Array,
            uniforms: Array) -> tuple[int, bool]:
     """Expand a node for each row of `uniforms` [B, 2 + A (+ 1)]: bin, node, control, and its duration.
 
     Args:
-        step, parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
+        parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
         feature_dims: Dimensions of the state that are the feature [F].
         bounds: Lower and upper bounds of the controls [2, A].
         durations: The least and the most steps of a control; if these are equal, `uniforms` has no column for
@@ -41,11 +39,10 @@ def expand(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims:
         How many nodes were written, and whether the last one is the goal. A state that is not finite ends the loop
         as well; it is the last one and not in the queue.
     """
-    reals, table, integers = uncounted(parameters[0]), uncounted(parameters[1]), uncounted(parameters[2])
-    states, features, controls = uncounted(columns.states), uncounted(columns.features), uncounted(columns.controls)
-    parents, rewards, ends = uncounted(columns.parents), uncounted(columns.rewards), uncounted(columns.terminal)
-    pool, heads, order = uncounted(queue.pool), uncounted(queue.heads), uncounted(queue.order)
-    head, cells, places = uncounted(queue.head), uncounted(queue.cells), uncounted(queue.table)
+    address, reals, table, integers = uncounted(parameters)
+    states, features, controls, parents, rewards, ends = uncounted(columns)
+    queue = uncounted(queue)
+    pool, heads, order, head, cells, places = queue.pool, queue.heads, queue.order, queue.head, queue.cells, queue.table
     least, longest = durations
     cell = np.empty(len(bin_size), np.int64)
     child, end = first, first + most
@@ -62,7 +59,7 @@ def expand(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims:
             for axis in range(bounds.shape[1]):
                 low, high = bounds[0, axis], bounds[1, axis]
                 controls[child, axis] = low + (high - low) * uniforms[row, 2 + axis]
-            reward, terminal, success = step(reals, table, integers, states, node, controls, child)
+            reward, terminal, success = call_step(address, reals, table, integers, states, node, controls, child)
             if taken == 0:
                 prefetch(states, pool[ahead, MEMBER])
             for axis in range(len(feature_dims)):

@@ -9,21 +9,30 @@ from numba.extending import intrinsic
 
 
 @intrinsic
-def uncounted(typing_context: Any, array: Any) -> Any:
-    """Return the same array as one that nobody owns; it must not outlive the one it was made from.
+def uncounted(typing_context: Any, value: Any) -> Any:
+    """Return the same array, or tuple with arrays, as one that nobody owns; it must not outlive what it is made from.
 
     Numba counts references where it hands arrays from one function to another. In a loop that calls a few, these atomic
     operations take most of the time.
     """
-    signature = array(array)
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        structure = context.make_array(signature.args[0])(context, builder, arguments[0])
-        structure.meminfo = cgutils.get_null_value(structure.meminfo.type)
-        structure.parent = cgutils.get_null_value(structure.parent.type)
-        return structure._getvalue()
+        kind, given = signature.args[0], arguments[0]
+        if isinstance(kind, types.Array):
+            return _without_owner(context, builder, kind, given)
+        for place, element in enumerate(kind):
+            if isinstance(element, types.Array):
+                array = _without_owner(context, builder, element, builder.extract_value(given, place))
+                given = builder.insert_value(given, array, place)
+        return given
 
-    return signature, generate
+    return value(value), generate
+
+
+def _without_owner(context: Any, builder: Any, kind: Any, array: Any) -> Any:
+    structure = context.make_array(kind)(context, builder, array)
+    structure.meminfo = cgutils.get_null_value(structure.meminfo.type)
+    structure.parent = cgutils.get_null_value(structure.parent.type)
+    return structure._getvalue()
 
 
 @intrinsic

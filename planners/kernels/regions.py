@@ -76,7 +76,7 @@ REGIONS_TYPE = types.NamedTuple((_rows, types.int64[:, ::1], types.int32[::1], _
 
 def no_regions(num_features: int, scales: int) -> Regions:
     """Return the arrays without regions; their rows cost no memory until they are written to."""
-    most, pool = 1 << 14, 1 << 16
+    most, pool = 1 << 11, 1 << 14
     tails = np.zeros((scales, 2), np.int32)
     tails[:, LOWEST] = -1
     totals = np.zeros(3, np.int64)

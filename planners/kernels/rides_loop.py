@@ -1,7 +1,5 @@
 """Rides: begin one, take note of each of its steps, and both in one compiled loop."""
 
-from typing import Any
-
 import numpy as np
 from numba import types
 from numba.core.types import npy_rng
@@ -10,7 +8,7 @@ from numpy.typing import NDArray
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, STEP_TYPE
+from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, call_step
 from pbcs_ompl.planners.kernels.bin_queue import FARTHEST, find_cell
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
 from pbcs_ompl.planners.kernels.memory import uncounted
@@ -152,6 +150,7 @@ def _arrive(rides: IndexArray, ride: int, yields: Array, states: Array, node: Nu
 def begin(regions: Regions, yields: Array, bounds: Array, rides: IndexArray, actions: Array, count: int,
           rng: np.random.Generator) -> None:
     """Begin those of the first `count` rides that are not active."""
+    regions = uncounted(regions)
     for ride in range(count):
         if rides[ride, ACTIVE] == 0:
             _begin(regions.rows, regions.order, regions.runs, regions.tails, regions.totals, regions.pool, yields,
@@ -165,9 +164,9 @@ def arrive(regions: Regions, yields: Array, rides: IndexArray, count: int, colum
 
     A ride from which nothing followed ends.
     """
-    states, features, _, parents, _, ends = columns
-    cell = regions.cell
-    ride = 0
+    regions = uncounted(regions)
+    states, features, _, parents, _, ends = uncounted(columns)
+    cell, ride = regions.cell, 0
     for node in range(first, last):
         number, opened = NO_BIN, False
         if not ends[node]:
@@ -188,15 +187,15 @@ def arrive(regions: Regions, yields: Array, rides: IndexArray, count: int, colum
 
 
 @njit(types.Tuple((types.int64, types.boolean))(
-    STEP_TYPE, PARAMETERS_TYPE, _integers, _matrix, COLUMNS_TYPE, types.int64, types.int64, REGIONS_TYPE, _vector,
+    PARAMETERS_TYPE, _integers, _matrix, COLUMNS_TYPE, types.int64, types.int64, REGIONS_TYPE, _vector,
     types.int64, types.float64[:, :, ::1], types.int64[:, ::1], _matrix, npy_rng))
-def explore(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
+def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
             columns: Columns, first: int, most: int, regions: Regions, bin_size: Array, longest: int, yields: Array,
             rides: IndexArray, actions: Array, rng: np.random.Generator) -> tuple[int, bool]:
     """Ride, one ride after the other, for `most` steps.
 
     Args:
-        step, parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
+        parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
         feature_dims: Dimensions of the state that are the feature [F].
         bounds: Lower and upper bounds of the controls [2, A].
         columns, first: The tree's arrays, with space for `most` more nodes, and the number of nodes so far.
@@ -211,23 +210,18 @@ def explore(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims
         How many nodes were written, and whether the last one is the goal. A state that is not finite ends the loop
         as well; it is the last one and in no bin.
     """
-    reals, table, integers = uncounted(parameters[0]), uncounted(parameters[1]), uncounted(parameters[2])
-    states, features, controls = uncounted(columns.states), uncounted(columns.features), uncounted(columns.controls)
-    parents, rewards, ends = uncounted(columns.parents), uncounted(columns.rewards), uncounted(columns.terminal)
-    rows, cells, places, order = (uncounted(regions.rows), uncounted(regions.cells), uncounted(regions.table),
-                                  uncounted(regions.order))
-    runs, tails, totals = uncounted(regions.runs), uncounted(regions.tails), uncounted(regions.totals)
-    pool, free, used, cell = (uncounted(regions.pool), uncounted(regions.free), uncounted(regions.used),
-                              uncounted(regions.cell))
-    yields, rides, actions, bounds = uncounted(yields), uncounted(rides), uncounted(actions), uncounted(bounds)
-    bin_size, feature_dims = uncounted(bin_size), uncounted(feature_dims)
+    address, reals, table, integers = uncounted(parameters)
+    states, features, controls, parents, rewards, ends = uncounted(columns)
+    regions, yields, rides, actions = uncounted(regions), uncounted(yields), uncounted(rides), uncounted(actions)
+    bounds, bin_size, feature_dims = uncounted(bounds), uncounted(bin_size), uncounted(feature_dims)
+    rows, cells, places, order, runs, tails, totals, pool, free, used, cell = regions
     for child in range(first, first + most):
         if rides[0, ACTIVE] == 0:
             _begin(rows, order, runs, tails, totals, pool, yields, bounds, rides, actions, 0, rng)
         node = rides[0, NODE]
         for axis in range(bounds.shape[1]):
             controls[child, axis] = actions[0, axis]
-        reward, terminal, success = step(reals, table, integers, states, node, controls, child)
+        reward, terminal, success = call_step(address, reals, table, integers, states, node, controls, child)
         for axis in range(len(feature_dims)):
             features[child, axis] = states[child, feature_dims[axis]]
         parents[child], rewards[child], ends[child] = node, reward, terminal
