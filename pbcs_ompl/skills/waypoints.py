@@ -7,6 +7,7 @@ import numpy as np
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, Counter, IndexArray
 from pbcs_ompl.skills.activation_sets import Ball, EnvironmentGoal, Target
+from pbcs_ompl.skills.line import fewest_hops
 from pbcs_ompl.skills.policy import ObservationTransform
 from pbcs_ompl.skills.settings import PlannedSettings, PlanSettings, StartSettings
 
@@ -110,23 +111,6 @@ def remove_loops(model: ResettableModel, states: Array, gap: float) -> IndexArra
         states: [T+1, D].
         gap: Longest hop, in the environment's distance.
 
-    Source: dynamic programming over the indices, O(T^2) distances, T at a time. Not in [Matheron2020].
+    Source: `line.fewest_hops`. Not in [Matheron2020].
     """
-    last = len(states) - 1
-    hops = np.full(last + 1, np.iinfo(np.int64).max)
-    before = np.arange(-1, last)
-    hops[0] = 0
-    for index in range(last):
-        near = model.distance(states[index + 1:], states[index]) <= gap
-        near[0] = True
-        better = index + 1 + np.flatnonzero(near & (hops[index + 1:] > hops[index] + 1))
-        hops[better] = hops[index] + 1
-        before[better] = index
-    return _backtrack(before, last)
-
-
-def _backtrack(before: IndexArray, last: int) -> IndexArray:
-    path = [last]
-    while path[-1] > 0:
-        path.append(int(before[path[-1]]))
-    return np.array(path[::-1], dtype=np.int64)
+    return fewest_hops(len(states), lambda index: model.distance(states[index + 1:], states[index]) <= gap)

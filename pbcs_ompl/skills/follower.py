@@ -1,0 +1,169 @@
+"""A follower: a controller of observations that moves along a line."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pbcs_ompl.agents.policy import Policy
+from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.types import Array, IndexArray
+from pbcs_ompl.resettable.actions import ActionMap, Actions
+from pbcs_ompl.skills.line import Line
+from pbcs_ompl.skills.policy import ObservationTransform
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """How far executions have come along a line.
+
+    Attributes:
+        pointers: Where they are on it [B].
+        stalled: Steps since a pointer moved last [B].
+    """
+
+    pointers: IndexArray
+    stalled: IndexArray
+
+    @classmethod
+    def at(cls, pointers: IndexArray) -> "Progress":
+        """Return that of executions that begin at some pointers [B]."""
+        return cls(pointers, np.zeros_like(pointers))
+
+    def __getitem__(self, members: IndexArray) -> "Progress":
+        return Progress(self.pointers[members], self.stalled[members])
+
+    def advanced(self, line: Line, features: Array, window: float) -> "Progress":
+        """Return the progress after a step that led to `features` [B, F]; see `Line.advance`."""
+        pointers = line.advance(features, self.pointers, window)
+        return Progress(pointers, np.where(pointers > self.pointers, 0, self.stalled + 1))
+
+
+class View(Protocol):
+    """What a policy sees of the world and of the line.
+
+    Attributes:
+        window: The longest move of a pointer in a step, a length of the line.
+    """
+
+    window: float
+
+    def features(self, observations: Array) -> Array:
+        """Return the features [B, F], in the unit of lines, that observations [B, O] show."""
+        ...
+
+    def inputs(self, observations: Array, line: Line, progress: Progress) -> Array:
+        """Return the inputs [B, I] of a policy."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class LineView:
+    """The observation, the line some distances ahead, and how long there was no progress, side by side.
+
+        (normaliser(o), line(pointer + distance_k) - f(o) for each k, min(stalled / patience, 1))
+
+    Attributes:
+        entries: The entries of the observation that are the feature, in its order [F].
+        unit: The unit of lines along each feature dimension [F]: f(o) = o[entries] / unit.
+        normaliser: Of the observations.
+        distances: How far the policy looks ahead along the line, lengths [K].
+        window: The longest move of a pointer in a step, a length.
+        patience: Steps without progress after which training gives up.
+    """
+
+    entries: IndexArray
+    unit: Array
+    normaliser: ObservationTransform
+    distances: Array
+    window: float
+    patience: int
+
+    @property
+    def size(self) -> int:
+        """Number I of inputs."""
+        return len(self.normaliser.origin) + len(self.distances) * len(self.entries) + 1
+
+    def features(self, observations: Array) -> Array:
+        """Return the features [B, F], in the unit of lines, that observations [B, O] show."""
+        shown: Array = observations[:, self.entries] / self.unit
+        return shown
+
+    def inputs(self, observations: Array, line: Line, progress: Progress) -> Array:
+        """Return the inputs [B, I] of a policy."""
+        ahead = line.ahead(self.features(observations), progress.pointers, self.distances)
+        return np.concatenate([self.normaliser(observations), ahead.reshape(len(observations), -1),
+                               np.minimum(progress.stalled / self.patience, 1.0)[:, None]], axis=1)
+
+
+class Follower:
+    """Drives along a line: a pointer for each episode moves forward on it, and a policy sees where the line leads.
+
+    Where one policy does not lead to the end, others take over at fixed places of the line.
+
+    Example:
+        >>> controller = chain.controller()
+        >>> controller.reset()
+        >>> observation, info = env.reset()
+        >>> observation, *rest = env.step(controller.act(observation))
+
+    Attributes:
+        line: The line; another one in the same unit may take its place between episodes.
+        progress: How far each episode has come [B].
+
+    Args:
+        policies: In the order of execution.
+        firsts: The pointer from which each of them acts, in increasing order; 0 comes first.
+        line: Where to go.
+        view: What the policies see.
+        actions: The action space.
+
+    Raises:
+        InvalidOption: there is no policy, or `firsts` does not fit.
+    """
+
+    def __init__(self, policies: Sequence[Policy], firsts: Sequence[int], line: Line, view: View, actions: ActionMap):
+        if not policies or len(firsts) != len(policies) or firsts[0] != 0 or any(np.diff(firsts) <= 0):
+            raise InvalidOption(f"{len(policies)} policies that act from the pointers {list(firsts)}; expected at "
+                                "least one, from 0 on, in increasing order")
+        self._policies, self._firsts, self._view, self._actions = policies, np.array(firsts), view, actions
+        self.line = line
+        self.reset()
+
+    def reset(self, count: int | None = None) -> None:
+        """Begin `count` episodes side by side; None for one, whose observations are vectors and not batches."""
+        self._single = count is None
+        self.progress = Progress(np.zeros(1 if count is None else count, dtype=np.int64),
+                                 np.full(1 if count is None else count, -1))
+
+    @property
+    def current(self) -> IndexArray:
+        """The index of the policy that acts in each episode [B]."""
+        return np.searchsorted(self._firsts, self.progress.pointers, side="right") - 1
+
+    def act(self, observation: Array, members: IndexArray | None = None) -> Actions:
+        """Return actions, members of the action space.
+
+        Args:
+            observation: Observations [B, O], entries of dictionaries one after the other by their names; [O] of a
+                single episode.
+            members: Which episodes they are of [B]; None for all, in order.
+
+        Raises:
+            InvalidOption: another number of observations than of episodes.
+        """
+        observations = np.asarray(observation, dtype=np.float64).reshape(1, -1) if self._single else observation
+        chosen = np.arange(len(self.progress.pointers)) if members is None else members
+        if len(observations) != len(chosen):
+            raise InvalidOption(f"got {len(observations)} observations for {len(chosen)} episodes; call reset(count)")
+        moved = self.progress[chosen].advanced(self.line, self._view.features(observations), self._view.window)
+        self.progress.pointers[chosen], self.progress.stalled[chosen] = moved.pointers, moved.stalled
+        inputs = self._view.inputs(observations, self.line, moved)
+        controls = np.empty((len(observations), len(self._actions.first)))
+        current = self.current[chosen]
+        for index in np.unique(current):
+            mine = current == index
+            controls[mine] = self._policies[index].act(inputs[mine])
+        actions = self._actions.to_actions(controls)
+        return actions[0] if self._single else actions
