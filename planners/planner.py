@@ -114,7 +114,7 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
     It works on any `ompl.control.SpaceInformation`. After `use_model` it propagates through the environment itself,
     many nodes at a time. Only exact solutions are reported. Exceptions never cross OMPL: `solve` keeps the first in
     `error` and returns ABORT. A second `solve` continues with the same tree and adds start states that are new in the
-    problem; `clear` drops the tree and continues with the same random numbers.
+    problem, but drops the tree for another problem. `clear` drops the tree and continues with the same random numbers.
 
     `getPlannerData` gives OMPL no nodes, because the installed OMPL aborts when Python overrides it; use `tree` or
     `planner_data`.
@@ -147,6 +147,7 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
         self._rng = self._seeds.child("strategy").generator()
         self._propagator: BatchPropagator | None = None
         self._tree: Tree | None = None
+        self._problem: Any = None
         self._error: PbcsError | None = None
 
     @property
@@ -191,7 +192,7 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
     def clear(self) -> None:
         """Drop the tree."""
         super().clear()
-        self._tree = None
+        self._tree = self._problem = None
         self._error = None
 
     def solve(self, ptc: Any) -> Any:
@@ -227,6 +228,8 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
             durations = self._durations if self._durations[1] > 1 else None
             self._propagator = OmplPropagator(self.getSpaceInformation(), durations)
         propagator, goal = self._propagator, problem.getGoal()
+        if problem is not self._problem:  # the same C++ object is the same in Python while it is held here
+            self._problem, self._tree = problem, None
         reached = self._add_starts(propagator, goal)
         tree = self._tree
         if tree is None:
