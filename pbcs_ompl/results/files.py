@@ -71,8 +71,8 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
             raise
 
 
-TEMPORARY = re.compile(r"\..+\.[0-9a-f]{8}")
-"""The names of the files that `write_atomically` renames at its end."""
+TEMPORARY = re.compile(r"\..+\.[0-9a-f]{8}(-journal)?")
+"""The names of the files that `write_atomically` renames at its end, and of what SQLite writes beside one."""
 
 
 def sweep_temporaries(folder: Path) -> None:

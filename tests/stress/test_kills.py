@@ -20,7 +20,7 @@ import pytest
 SEED = 20261127
 KILLS = {"plan": 15, "train": 21, "compare": 12, "study": 12}
 SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-LEFTOVER = re.compile(r"\..+\.[0-9a-f]{8}|\.lock.*")
+LEFTOVER = re.compile(r"\..+\.[0-9a-f]{8}(-journal)?|\.lock.*")
 MEASURED = re.compile(r"seconds.*|memory.*|out|database|progress|cpu_seconds")
 NOT_COMPARED = {"provenance.json", "comparison.db"}
 SCRIPT = """
