@@ -3,9 +3,10 @@
 from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.config import TrainConfig, method_settings
 from pbcs_ompl.skills.evaluation import Evaluation, evaluate
+from pbcs_ompl.skills.load_chain import load_chain
 from pbcs_ompl.skills.settings import MethodSettings, preset_names
 from pbcs_ompl.skills.train import resume, train
 from pbcs_ompl.skills.training import TrainResult
 
 __all__ = ["Evaluation", "MethodSettings", "Skill", "SkillChain", "TrainConfig", "TrainResult", "evaluate",
-           "method_settings", "preset_names", "resume", "train"]
+           "load_chain", "method_settings", "preset_names", "resume", "train"]
