@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import GROWTH, resized_copy
+from pbcs_ompl.planners.kernels.cells import cell_of, find_cell, rehash
 from pbcs_ompl.planners.kernels.memory import uncounted
 from pbcs_ompl.planners.kernels.runs import LENGTH, LOWEST, SIZE, START, Number, append, choose
 from pbcs_ompl.planners.kernels.slices import CLASSES, SMALLEST, double, rows_needed, take
-
-FARTHEST = 4.6e18  # cells beyond this coordinate are one cell: int64 ends there
 
 
 class BinQueue(NamedTuple):
@@ -110,32 +109,6 @@ def tied_bins(queue: BinQueue) -> int:
     return int(queue.head[0, LENGTH] - queue.head[0, LOWEST])
 
 
-@njit()
-def cell_of(features: NDArray[np.float64], row: int, size: NDArray[np.float64],
-            cell: NDArray[np.int64]) -> None:
-    """Write the coordinates floor(feature / size) of features[row] into `cell` [F]."""
-    for axis in range(len(cell)):
-        cell[axis] = int(min(max(np.floor(features[row, axis] / size[axis]), -FARTHEST), FARTHEST))
-
-
-@njit(inline="always")
-def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[np.int64]) -> Number:
-    """Return the position in `table` of a cell [F], or of the empty place where it belongs."""
-    mixed = np.uint64(0)
-    for axis in range(len(cell)):
-        mixed = (mixed ^ np.uint64(cell[axis])) * np.uint64(0x9E3779B97F4A7C15)
-        mixed ^= mixed >> np.uint64(29)
-    place = np.int64(mixed & np.uint64(len(table) - 1))
-    while table[place] > 0:
-        same = True
-        for axis in range(len(cell)):
-            same = same and cells[table[place] - 1, axis] == cell[axis]
-        if same:
-            return place
-        place = (place + 1) & (len(table) - 1)
-    return place
-
-
 @njit(inline="always")
 def add(pool: NDArray[np.int32], heads: NDArray[np.int32], number: Number, node: Number) -> bool:
     """Add a node of count 0 to a bin; return False where the bin is full, or there is none (number -1)."""
@@ -184,10 +157,3 @@ def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: Number) -> Number:
     queue.table[place] = number + 1
     append(queue.order, queue.head, 0, number)
     return number
-
-
-@njit()
-def rehash(cells: NDArray[np.int64], table: NDArray[np.int32], bins: int) -> None:
-    """Put the first `bins` cells into an empty hash table."""
-    for number in range(bins):
-        table[find_cell(cells, table, cells[number])] = number + 1

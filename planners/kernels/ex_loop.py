@@ -7,7 +7,8 @@ from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, call_step
-from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, grow_and_add
+from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, grow_and_add
+from pbcs_ompl.planners.kernels.cells import cell_of, find_cell
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
 from pbcs_ompl.planners.kernels.memory import prefetch, uncounted
 from pbcs_ompl.planners.kernels.runs import MEMBER, choose, peek
@@ -19,7 +20,7 @@ _integers = types.int64[::1]
 
 @njit(types.Tuple((types.int64, types.boolean))(
     PARAMETERS_TYPE, _integers, _matrix, types.UniTuple(types.int64, 2),
-    COLUMNS_TYPE, types.int64, types.int64, QUEUE_TYPE, _vector, _matrix))
+    COLUMNS_TYPE, types.int64, types.int64, QUEUE_TYPE, _vector, _matrix), error_model="numpy")
 def expand(parameters: tuple[int, Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
            durations: tuple[int, int], columns: Columns, first: int, most: int, queue: BinQueue, bin_size: Array,
            uniforms: Array) -> tuple[int, bool]:

@@ -27,7 +27,7 @@ def lowest(order: Rows, runs: Rows, tails: Rows, scale: Number, uniform: float) 
     return region
 
 
-@njit()
+@njit(inline="always")
 def enter(order: Rows, runs: Rows, tails: Rows, totals: NDArray[np.int64], rows: Rows, scale: Number,
           region: Number) -> None:
     """Add a region with key 0."""
@@ -40,7 +40,7 @@ def enter(order: Rows, runs: Rows, tails: Rows, totals: NDArray[np.int64], rows:
     tails[scale, MEMBERS] = place + 1
 
 
-@njit()
+@njit(inline="always")
 def lift(order: Rows, runs: Rows, tails: Rows, totals: NDArray[np.int64], rows: Rows, scale: Number,
          region: Number, key: Number) -> None:
     """Give a region a higher key."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import GROWTH, resized_copy
-from pbcs_ompl.planners.kernels.bin_queue import find_cell, rehash
+from pbcs_ompl.planners.kernels.cells import WEIGHT, find_hashed, linear_hash, rehash
 from pbcs_ompl.planners.kernels.ranking import (
     CHILD,
     COUNT,
@@ -42,7 +42,7 @@ class Regions(NamedTuple):
     rows: Rows
     """What is known of each region [M, 10]."""
     cells: NDArray[np.int64]
-    """Scale and integer coordinates of each region [M, 1 + F]."""
+    """Integer coordinates of each region, and its scale [M, F + 1]."""
     table: NDArray[np.int32]
     """Hash table of region numbers plus one, open addressing, 0 for empty [H]."""
     order: Rows
@@ -58,7 +58,7 @@ class Regions(NamedTuple):
     free: NDArray[np.int32]
     used: NDArray[np.int64]
     cell: NDArray[np.int64]
-    """Where a cell is computed [1 + F]."""
+    """Where a cell is computed [F + 1]."""
 
     @property
     def nbytes(self) -> int:
@@ -128,52 +128,56 @@ def add_node(rows: Rows, pool: Rows, free: NDArray[np.int32], used: NDArray[np.i
 
 @njit()
 def open_bin(regions: Regions, cell: NDArray[np.int64]) -> Number:
-    """Open the bin of `cell` [1 + F] (overwritten), and the regions around it that are not open; return its number."""
-    rows, order, runs, tails, totals = regions.rows, regions.order, regions.runs, regions.tails, regions.totals
-    opened = np.int64(totals[REGIONS])
+    """Open the bin of `cell` [F + 1] (overwritten), and the regions around it that are not open; return its number."""
+    rows, cells, table, order, runs, tails, totals, pool, free, used, _ = regions
+    features, opened = len(cell) - 1, np.int64(totals[REGIONS])
     inner = np.int64(-1)
     for scale in range(len(order)):
-        cell[0] = scale
-        place = find_cell(regions.cells, regions.table, cell)
-        number = np.int64(regions.table[place]) - 1
+        cell[features] = scale
+        mixed = linear_hash(cell)
+        place = find_hashed(cells, table, cell, mixed)
+        number = np.int64(table[place]) - 1
         known = number >= 0
         if not known:
             number = np.int64(totals[REGIONS])
             totals[REGIONS] = number + 1
-            regions.table[place] = number + 1
+            table[place] = number + 1
             for axis in range(len(cell)):
-                regions.cells[number, axis] = cell[axis]
+                cells[number, axis] = cell[axis]
             rows[number, PARENT] = rows[number, CHILD] = rows[number, SIBLING] = -1
             rows[number, COUNT] = rows[number, LENGTH] = 0
             enter(order, runs, tails, totals, rows, scale, number)
-            _meet_neighbours(regions, scale, number, cell)
+            _meet_neighbours(rows, cells, table, order, runs, tails, totals, scale, number, cell, mixed)
         if inner >= 0:
             rows[inner, PARENT], rows[inner, SIBLING] = number, rows[number, CHILD]
             rows[number, CHILD] = inner
         if known:
             break
         inner = number
-        for axis in range(1, len(cell)):
+        for axis in range(features):
             cell[axis] >>= 1
-    rows[opened, START], rows[opened, SIZE] = take(regions.pool, regions.free, regions.used, SMALLEST), SMALLEST
+    rows[opened, START], rows[opened, SIZE] = take(pool, free, used, SMALLEST), SMALLEST
     return opened
 
 
-@njit()
-def _meet_neighbours(regions: Regions, scale: Number, number: Number, cell: NDArray[np.int64]) -> None:
+@njit(inline="always")
+def _meet_neighbours(rows: Rows, cells: NDArray[np.int64], table: NDArray[np.int32], order: Rows, runs: Rows,
+                     tails: Rows, totals: NDArray[np.int64], scale: Number, number: Number, cell: NDArray[np.int64],
+                     mixed: np.uint64) -> None:
     """Count the neighbours of a new region that are not open; those that it surrounds, and itself, rise."""
-    rows, order, runs, tails, totals = regions.rows, regions.order, regions.runs, regions.tails, regions.totals
-    missing = 2 * (len(cell) - 1)
-    for axis in range(1, len(cell)):
+    missing, weight = 2 * (len(cell) - 1), WEIGHT
+    for axis in range(len(cell) - 1):
         for side in (-1, 1):
             cell[axis] += side
-            other = np.int64(regions.table[find_cell(regions.cells, regions.table, cell)]) - 1
+            place = find_hashed(cells, table, cell, mixed + np.uint64(side) * weight)
             cell[axis] -= side
+            other = np.int64(table[place]) - 1
             if other >= 0:
                 missing -= 1
                 rows[other, MISSING] -= 1
                 if rows[other, MISSING] == 0:
                     lift(order, runs, tails, totals, rows, scale, other, key_of(rows, other))
+        weight *= WEIGHT
     rows[number, MISSING] = missing
     if missing == 0:
         lift(order, runs, tails, totals, rows, scale, number, key_of(rows, number))

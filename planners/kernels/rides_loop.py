@@ -9,7 +9,7 @@ from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, call_step
-from pbcs_ompl.planners.kernels.bin_queue import FARTHEST, find_cell
+from pbcs_ompl.planners.kernels.cells import cell_of, find_cell
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
 from pbcs_ompl.planners.kernels.memory import uncounted
 from pbcs_ompl.planners.kernels.ranking import CHILD, COUNT, LENGTH, PARENT, SIBLING, START, lift, lowest
@@ -64,7 +64,7 @@ def _least_child(rows: Rows, region: Number, uniform: float) -> Number:
         child = rows[child, SIBLING]
 
 
-@njit(error_model="numpy")
+@njit(inline="always")
 def _begin(rows: Rows, order: Rows, runs: Rows, tails: Rows, totals: NDArray[np.int64], pool: Rows, yields: Array,
            bounds: Array, rides: IndexArray, actions: Array, ride: int, rng: np.random.Generator) -> None:
     """Choose scale, kind, patience, a region of few rides down to a bin, one of its nodes, and a control."""
@@ -97,7 +97,7 @@ def _begin(rows: Rows, order: Rows, runs: Rows, tails: Rows, totals: NDArray[np.
     rides[ride, STEPS] = rides[ride, DRY] = rides[ride, KNOWN] = rides[ride, GAINS] = 0
 
 
-@njit(error_model="numpy")
+@njit(inline="always")
 def _end(yields: Array, rides: IndexArray, ride: int) -> None:
     """End a ride: the weight of an answer is (bins opened / steps used with it)**4."""
     for question in (SCALE, KIND, PATIENCE):
@@ -110,18 +110,7 @@ def _end(yields: Array, rides: IndexArray, ride: int) -> None:
     rides[ride, ACTIVE] = 0
 
 
-@njit(error_model="numpy")
-def _find_bin(cells: IndexArray, table: NDArray[np.int32], features: Array, node: Number, bin_size: Array,
-              cell: IndexArray) -> Number:
-    """Return the bin of a node, or -1 where it is not open; write it into `cell` [1 + F]."""
-    cell[0] = 0
-    for axis in range(len(bin_size)):
-        cell[1 + axis] = int(min(max(np.floor(features[node, axis] / bin_size[axis]), -FARTHEST), FARTHEST))
-    number: Number = np.int64(table[find_cell(cells, table, cell)]) - 1
-    return number
-
-
-@njit(error_model="numpy")
+@njit(inline="always")
 def _arrive(rides: IndexArray, ride: int, yields: Array, states: Array, node: Number, number: Number, opened: bool,
             terminal: bool, longest: int) -> None:
     """Take note that a ride has come to a node, in bin `number` unless it is terminal; end the ride where it ends."""
@@ -170,7 +159,9 @@ def arrive(regions: Regions, yields: Array, rides: IndexArray, count: int, colum
     for node in range(first, last):
         number, opened = NO_BIN, False
         if not ends[node]:
-            number = _find_bin(regions.cells, regions.table, features, node, bin_size, cell)
+            cell_of(features, node, bin_size, cell)
+            cell[len(bin_size)] = 0
+            number = np.int64(regions.table[find_cell(regions.cells, regions.table, cell)]) - 1
             if number < 0:
                 number, opened = open_bin(regions, cell), True
             add_node(regions.rows, regions.pool, regions.free, regions.used, number, node)
@@ -188,7 +179,7 @@ def arrive(regions: Regions, yields: Array, rides: IndexArray, count: int, colum
 
 @njit(types.Tuple((types.int64, types.boolean))(
     PARAMETERS_TYPE, _integers, _matrix, COLUMNS_TYPE, types.int64, types.int64, REGIONS_TYPE, _vector,
-    types.int64, types.float64[:, :, ::1], types.int64[:, ::1], _matrix, npy_rng))
+    types.int64, types.float64[:, :, ::1], types.int64[:, ::1], _matrix, npy_rng), error_model="numpy")
 def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
             columns: Columns, first: int, most: int, regions: Regions, bin_size: Array, longest: int, yields: Array,
             rides: IndexArray, actions: Array, rng: np.random.Generator) -> tuple[int, bool]:
@@ -229,7 +220,9 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
             return child + 1 - first, False
         number, opened = NO_BIN, False
         if not terminal:
-            number = _find_bin(cells, places, features, child, bin_size, cell)
+            cell_of(features, child, bin_size, cell)
+            cell[len(bin_size)] = 0
+            number = np.int64(places[find_cell(cells, places, cell)]) - 1
             if number < 0:
                 number, opened = open_bin(regions, cell), True
             add_node(rows, pool, free, used, number, child)

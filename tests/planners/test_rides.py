@@ -59,7 +59,7 @@ def check_regions(regions, features):
     assert len(cells) == count
     rows = regions.rows
     for cell, number in cells.items():
-        around = [(*cell[:axis], cell[axis] + side, *cell[axis + 1:]) for axis in range(1, features + 1)
+        around = [(*cell[:axis], cell[axis] + side, *cell[axis + 1:]) for axis in range(features)
                   for side in (-1, 1)]
         missing = sum(other not in cells for other in around)
         assert rows[number, MISSING] == missing
@@ -67,15 +67,15 @@ def check_regions(regions, features):
         run = regions.runs[rows[number, RUN]]
         assert run[KEY] == key
         assert run[FIRST] <= rows[number, PLACE] < run[END]
-        assert regions.order[cell[0], rows[number, PLACE]] == number
+        assert regions.order[cell[-1], rows[number, PLACE]] == number
     for scale in range(len(regions.order)):
-        members = [number for cell, number in cells.items() if cell[0] == scale]
+        members = [number for cell, number in cells.items() if cell[-1] == scale]
         order = regions.order[scale, :len(members)].tolist()
         assert sorted(order) == sorted(members)
         keys = [regions.runs[rows[number, RUN], KEY] for number in order]
         assert keys == sorted(keys, reverse=True)
         inner = sum(rows[number, COUNT] for number in members)
-        assert inner == sum(rows[number, COUNT] for cell, number in cells.items() if cell[0] == 0)
+        assert inner == sum(rows[number, COUNT] for cell, number in cells.items() if cell[-1] == 0)
     return cells
 
 
@@ -104,7 +104,7 @@ def test_regions_by_brute_force(seed, width, features):
         rides.inserted(tree, first, len(tree))
     regions = rides.regions
     cells = check_regions(regions, features)
-    kept = {int(node) for cell, number in cells.items() if cell[0] == 0
+    kept = {int(node) for cell, number in cells.items() if cell[-1] == 0
             for node in regions.pool[regions.rows[number, START]:, 0][:regions.rows[number, LENGTH]]}
     assert kept == set(np.flatnonzero(~tree.terminal).tolist())
 
@@ -115,7 +115,7 @@ def test_opening_the_same_world_in_any_order_gives_the_same_regions():
     for _ in range(3):
         regions = reserve(no_regions(2, 4), len(points))
         for point in rng.permutation(points):
-            open_bin(regions, np.array([0, *point]))
+            open_bin(regions, np.array([*point, 0]))
         check_regions(regions, 2)
         counts.add(int(regions.totals[REGIONS]))
     assert len(counts) == 1
