@@ -3,9 +3,13 @@
 from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.config import TrainConfig, method_settings
 from pbcs_ompl.skills.evaluation import Evaluation, evaluate
+from pbcs_ompl.skills.follow_lines import follow
+from pbcs_ompl.skills.robot_follower import RobotFollower
 from pbcs_ompl.skills.settings import MethodSettings, preset_names
 from pbcs_ompl.skills.train import resume, train
+from pbcs_ompl.skills.train_follower import FollowerResult, resume_follower, train_follower
 from pbcs_ompl.skills.training import TrainResult
 
-__all__ = ["Evaluation", "MethodSettings", "Skill", "SkillChain", "TrainConfig", "TrainResult", "evaluate",
-           "method_settings", "preset_names", "resume", "train"]
+__all__ = ["Evaluation", "FollowerResult", "MethodSettings", "RobotFollower", "Skill", "SkillChain", "TrainConfig",
+           "TrainResult", "evaluate", "follow", "method_settings", "preset_names", "resume", "resume_follower", "train",
+           "train_follower"]
