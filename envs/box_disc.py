@@ -38,11 +38,9 @@ class BoxEnv(PointEnv):
         """Return the next states [B, 2] and whether the border was hit [B]."""
         return kernels.move_in_box(self.settings, states, controls)
 
-    def step_one(self, state: list[float], control: list[float]) -> list[float]:
-        """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
-        x, y = state
-        a, b = control
-        return [*kernels.step_one_in_box(self.settings, x, y, a, b)]
+    def move_one(self, x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
+        """Return what `move` does with one point."""
+        return kernels.move_one_in_box(self.settings, x, y, a, b)
 
     def compiled_step(self) -> CompiledStep:
         """Return the step as a function for compiled planners."""
@@ -94,11 +92,9 @@ class DiscEnv(PointEnv):
         """Return the next states [B, 2] and whether the border was hit [B]."""
         return kernels.move_in_disc(self.settings, states, controls)
 
-    def step_one(self, state: list[float], control: list[float]) -> list[float]:
-        """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
-        x, y = state
-        a, b = control
-        return [*kernels.step_one_in_disc(self.settings, x, y, a, b)]
+    def move_one(self, x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
+        """Return what `move` does with one point."""
+        return kernels.move_one_in_disc(self.settings, x, y, a, b)
 
     def compiled_step(self) -> CompiledStep:
         """Return the step as a function for compiled planners."""

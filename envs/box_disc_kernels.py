@@ -6,7 +6,6 @@ from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
 
-Point = tuple[float, float]
 Step = tuple[float, float, bool]
 
 # Places of their own settings in the array `settings`, after those of `point_kernels`.
@@ -23,10 +22,9 @@ def _move_in_box(settings: Array, x: float, y: float, a: float, b: float) -> Ste
 
 
 @njit()
-def step_one_in_box(settings: Array, x: float, y: float, a: float, b: float) -> Point:
-    """Return the next position of one point as a tuple of two floats."""
-    x1, y1, _ = _move_in_box(settings, x, y, a, b)
-    return x1, y1
+def move_one_in_box(settings: Array, x: float, y: float, a: float, b: float) -> Step:
+    """Return the next position of one point, and whether the step hit the border."""
+    return _move_in_box(settings, x, y, a, b)
 
 
 @njit()
@@ -86,10 +84,9 @@ def _move_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> St
 
 
 @njit()
-def step_one_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> Point:
-    """Return the next position of one point as a tuple of two floats."""
-    x1, y1, _ = _move_in_disc(settings, x, y, a, b)
-    return x1, y1
+def move_one_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> Step:
+    """Return the next position of one point, and whether the step hit the border."""
+    return _move_in_disc(settings, x, y, a, b)
 
 
 @njit()

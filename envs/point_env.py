@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from math import isfinite
 from typing import Any, ClassVar
 
 import gymnasium
@@ -28,7 +29,7 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
     """S = [0, extent]^2, A = [-0.1, 0.1]^2, reward 1 where ||s' - goal|| < 0.2 ([Matheron2020] 3.1, 5.4).
 
     The state is the observation: the position. Offers the `VectorisedEnv` protocol. Actions outside of the
-    box are clipped. A subclass says how points move (`move`, `step_one`) and where they can be (`is_valid`).
+    box are clipped. A subclass says how points move (`move`, `move_one`) and where they can be (`is_valid`).
 
     Args:
         extent: Edge length of the world.
@@ -82,8 +83,8 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         """Return the next states [B, 2] and whether a wall was hit [B]; the arguments are trusted."""
 
     @abstractmethod
-    def step_one(self, state: list[float], control: list[float]) -> list[float]:
-        """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
+    def move_one(self, x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
+        """Return what `move` does, bit for bit, with one point (x, y) under the control (a, b): x, y, hit."""
 
     @abstractmethod
     def compiled_step(self) -> CompiledStep | None:
@@ -121,12 +122,18 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Move by `action` [2]; `info` has `is_success` = `success`, `hit_wall`, `distance_to_goal`."""
-        controls = check_batch("action", np.reshape(action, (1, -1)), 2, InvalidOption)
-        after, hits = self.move(self._state[None], controls)
-        rewards, terminated, _ = point_kernels.finish(self.settings, after, hits)
-        self._state = after[0]
-        info = self._info(hit_wall=bool(hits[0]))
-        return self._state.copy(), float(rewards[0]), bool(terminated[0]), False, info
+        control = np.asarray(action, dtype=np.float64).ravel().tolist()
+        if len(control) != 2 or not (isfinite(control[0]) and isfinite(control[1])):
+            check_batch("action", np.reshape(action, (1, -1)), 2, InvalidOption)  # raises, and says why
+        x, y, hit = self.move_one(*self._state.tolist(), *control)
+        reward, terminated, _ = point_kernels.outcome(self.settings, x, y, hit)
+        self._state = np.array([x, y])
+        return self._state.copy(), reward, terminated, False, self._info(hit_wall=hit)
+
+    def step_one(self, state: list[float], control: list[float]) -> list[float]:
+        """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
+        x, y, _ = self.move_one(*state, *control)
+        return [x, y]
 
     def transition(self, states: Array, controls: Array) -> Transition:
         """Advance states [B, 2] by one step under controls [B, 2].
@@ -181,7 +188,7 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         return rasterise(float(self.state_high[0]), self.walls, self.goal_circle, self._state)
 
     def _info(self, hit_wall: bool) -> dict[str, Any]:
-        distance = float(self.goal_distance(self._state[None])[0])
+        distance = point_kernels.distance(self.settings, *self._state.tolist())
         success = distance < GOAL_RADIUS
         return {"is_success": success, "success": success, "hit_wall": hit_wall, "distance_to_goal": distance}
 

@@ -27,7 +27,8 @@ def displacement(settings: Array, a: float) -> float:
 
 
 @njit()
-def _distance(settings: Array, x: float, y: float) -> float:
+def distance(settings: Array, x: float, y: float) -> float:
+    """Return the Euclidean distance of (x, y) to the centre of the goal; infinite without a goal."""
     dx, dy = x - settings[GOAL_X], y - settings[GOAL_Y]
     length: float = np.sqrt(dx * dx + dy * dy)
     return length
@@ -38,14 +39,14 @@ def goal_distance(settings: Array, states: Array) -> Array:
     """Return the Euclidean distances [B] of states [B, 2] to the centre of the goal."""
     distances = np.empty(states.shape[0])
     for k in range(states.shape[0]):
-        distances[k] = _distance(settings, states[k, 0], states[k, 1])
+        distances[k] = distance(settings, states[k, 0], states[k, 1])
     return distances
 
 
 @njit()
 def outcome(settings: Array, x: float, y: float, hit: bool) -> tuple[float, bool, bool]:
     """Return reward, terminated and success of a step that ended in (x, y)."""
-    reached = _distance(settings, x, y) < settings[GOAL_RADIUS]
+    reached = distance(settings, x, y) < settings[GOAL_RADIUS]
     reward = (1.0 if reached else 0.0) + (settings[PENALTY] if hit else 0.0)
     return reward, reached and settings[TERMINATE] != 0.0, reached
 

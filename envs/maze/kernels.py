@@ -125,11 +125,10 @@ def _move(rectangles: Array, lists: IndexArray, settings: Array,
 
 
 @njit()
-def step_one(rectangles: Array, lists: IndexArray, settings: Array,
-             x: float, y: float, a: float, b: float) -> Point:
-    """Return the next position of one point as a tuple of two floats."""
-    x1, y1, _ = _move(rectangles, lists, settings, x, y, a, b)
-    return x1, y1
+def move_one(rectangles: Array, lists: IndexArray, settings: Array,
+             x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
+    """Return the next position of one point, and whether the step hit a wall."""
+    return _move(rectangles, lists, settings, x, y, a, b)
 
 
 @njit()

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -22,9 +23,9 @@ class MazeLayout:
     Cell (i, j) is the square [i, i + 1] x [j, j + 1]; j grows upwards.
 
     Attributes:
-        vertical: Whether there is a wall on x = i along row j [size + 1, size].
+        vertical: Whether there is a wall on x = i along row j [size + 1, size]; read-only, as all arrays here.
         horizontal: Whether there is a wall on y = j along column i [size, size + 1].
-        rectangles: The walls [W, 4] (x0, y0, x1, y1), 0.1 thick, collinear neighbours merged; read-only.
+        rectangles: The walls [W, 4] (x0, y0, x1, y1), 0.1 thick, collinear neighbours merged.
     """
 
     vertical: BoolArray
@@ -36,8 +37,9 @@ class MazeLayout:
         walls = [(x, a, x, b) for x, column in enumerate(self.vertical) for a, b in _runs(column)]
         walls += [(a, y, b, y) for y, row in enumerate(self.horizontal.T) for a, b in _runs(row)]
         rectangles = np.array(walls, dtype=np.float64) + np.array([-half, -half, half, half])
-        rectangles.setflags(write=False)
         object.__setattr__(self, "rectangles", rectangles)
+        for array in (self.vertical, self.horizontal, rectangles):
+            array.setflags(write=False)
 
     @property
     def size(self) -> int:
@@ -55,7 +57,7 @@ class MazeLayout:
             raise InvalidOption(f"size={size!r}: expected an integer from {MIN_SIZE} to {MAX_SIZE}")
         if not (_is_integer(maze_seed) and maze_seed >= 0):
             raise InvalidOption(f"maze_seed={maze_seed!r}: expected an integer >= 0")
-        return cls.from_passages(int(size), passages_of(int(size), int(maze_seed)))
+        return _made_before(int(size), int(maze_seed))
 
     @classmethod
     def from_passages(cls, size: int, passages: Iterable[Passage]) -> "MazeLayout":
@@ -106,6 +108,15 @@ class MazeLayout:
         for (i, j), mark in (marks or {}).items():
             grid[2 * i + 1, 2 * j + 1] = mark
         return ["".join(row) for row in grid.T[::-1]]
+
+
+MAZES_KEPT = 32
+"""Mazes that are not made again while they are among the last ones: executions and workers ask for the same ones."""
+
+
+@lru_cache(MAZES_KEPT)
+def _made_before(size: int, maze_seed: int) -> MazeLayout:
+    return MazeLayout.from_passages(size, passages_of(size, maze_seed))
 
 
 def _runs(present: BoolArray) -> Iterator[tuple[int, int]]:

@@ -1,6 +1,7 @@
 """The continuous N x N mazes of [Matheron2020] 4.1, 5.4 and 7.3: `pbcs/Maze-v0`."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -9,9 +10,9 @@ from pbcs_ompl.core.errors import InvalidOption, did_you_mean
 from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.envs.maze import kernels
 from pbcs_ompl.envs.maze.fcl_move import move_by_fcl
-from pbcs_ompl.envs.maze.layout import MazeLayout
+from pbcs_ompl.envs.maze.layout import MAZES_KEPT, MazeLayout
 from pbcs_ompl.envs.point_env import MAX_STEP, CompiledStep, PointEnv
-from pbcs_ompl.envs.wall_grid import build_wall_grid
+from pbcs_ompl.envs.wall_grid import WallGrid, build_wall_grid
 from pbcs_ompl.envs.walls_fcl import WallsFcl
 
 CollisionResponse = Literal["stay", "slide"]
@@ -57,7 +58,7 @@ class MazeEnv(PointEnv):
         self._fcl = WallsFcl(self.layout.rectangles)
         self._slide = collision_response == "slide"
         size = self.layout.size
-        self._grid = build_wall_grid(self.layout.rectangles, size, MAX_STEP)
+        self._grid = _grid_of(self.layout)
         default_goal = (0.5, 1.5) if size == 2 else (size - 0.5, size - 0.5)
         super().__init__(size, start, default_goal if goal is None else goal, wall_penalty=wall_penalty,
                          terminate_on_success=terminate_on_success, normalize_actions=normalize_actions,
@@ -75,16 +76,13 @@ class MazeEnv(PointEnv):
             return move_by_fcl(self._fcl, states, states + self.displacements(controls), self._slide)
         return kernels.move(self._grid.rectangles, self._grid.lists, self.settings, states, controls)
 
-    def step_one(self, state: list[float], control: list[float]) -> list[float]:
-        """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
+    def move_one(self, x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
+        """Return what `move` does with one point."""
         if self.collision == "fcl":
-            after, _ = self.move(np.array([state]), np.array([control]))
-            following: list[float] = after[0].tolist()
-            return following
+            after, hits = self.move(np.array([[x, y]]), np.array([[a, b]]))
+            return float(after[0, 0]), float(after[0, 1]), bool(hits[0])
         rectangles, lists, _ = self._grid
-        x, y = state
-        a, b = control
-        return [*kernels.step_one(rectangles, lists, self.settings, x, y, a, b)]
+        return kernels.move_one(rectangles, lists, self.settings, x, y, a, b)
 
     def compiled_step(self) -> CompiledStep | None:
         """Return the step as a function for compiled planners; None with collision="fcl"."""
@@ -106,6 +104,11 @@ class MazeEnv(PointEnv):
         marks = {} if goal is None else {(int(goal[0]), int(goal[1])): "G"}
         marks[int(self._state[0]), int(self._state[1])] = "A"
         return "\n".join(self.layout.draw(marks)) + "\n"
+
+
+@lru_cache(MAZES_KEPT)
+def _grid_of(layout: MazeLayout) -> WallGrid:
+    return build_wall_grid(layout.rectangles, layout.size, MAX_STEP)
 
 
 def _layout(size: int | None, maze_seed: int, drawing: Sequence[str] | None) -> MazeLayout:

@@ -1,6 +1,6 @@
 """A policy as plain arrays: what is kept of an actor after training, and all that a skill needs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.agents.kernels.network import outputs
 from pbcs_ompl.core.errors import DamagedFile
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, IndexArray
 
 Float32Array = NDArray[np.float32]
 LAYER_NORM_EPSILON = 1e-5
@@ -40,20 +40,30 @@ class Policy:
         """Length O of an observation."""
         return int(self.layers[0][0].shape[0])
 
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Widths of the layers, from the observation to the action."""
+        return (self.observation_size, *(layer[0].shape[1] for layer in self.layers))
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether no layer is normalised."""
+        return all(len(layer) == 2 for layer in self.layers)
+
     @cached_property
-    def _plain(self) -> tuple[tuple[int, ...], Float32Array] | None:
-        """Sizes and one buffer of all parameters, as the kernel takes them; None with layer norm."""
-        if any(len(layer) > 2 for layer in self.layers):
-            return None
-        sizes = (self.observation_size, *(layer[0].shape[1] for layer in self.layers))
-        return sizes, np.concatenate([array.ravel() for layer in self.layers for array in layer])
+    def parameters(self) -> Float32Array:
+        """All parameters, layer by layer [P]."""
+        return np.concatenate([array.ravel() for layer in self.layers for array in layer])
 
     def act(self, observations: Array) -> Array:
         """Return the actions [B, A] for observations [B, O]."""
         values = observations.astype(np.float32)
-        if self._plain is not None:
-            return to_box(np.tanh(outputs(*self._plain, values)), self.action_low, self.action_high)
-        return to_box(np.tanh(self._outputs(values)), self.action_low, self.action_high)
+        if self.is_plain:
+            first = np.zeros(len(values), np.int64)
+            raw = outputs(self.sizes, self.parameters[None], values, first)
+        else:
+            raw = self._outputs(values)
+        return to_box(np.tanh(raw), self.action_low, self.action_high)
 
     def _outputs(self, values: Float32Array) -> Float32Array:
         for weight, bias, *norm in self.layers[:-1]:
@@ -96,6 +106,28 @@ class Policy:
             raise DamagedFile(f"policy with an array that has no numbers: {error}") from error
         _check(layers, low, high)
         return cls(layers, low, high)
+
+
+class PolicyStack:
+    """N policies of one action box that act together: compiled where their layers are plain and of the same sizes."""
+
+    def __init__(self, policies: Sequence[Policy]):
+        self._policies = policies
+        self._low, self._high = policies[0].action_low, policies[0].action_high
+        self._sizes = policies[0].sizes
+        alike = all(policy.is_plain and policy.sizes == self._sizes for policy in policies)
+        self._parameters = np.array([policy.parameters for policy in policies]) if alike else None
+
+    def act(self, observations: Array, chosen: IndexArray) -> Array:
+        """Return the actions [B, A] of the policies `chosen` [B] for observations [B, O]."""
+        if self._parameters is not None:
+            raw = outputs(self._sizes, self._parameters, observations.astype(np.float32), chosen)
+            return to_box(np.tanh(raw), self._low, self._high)
+        actions = np.empty((len(observations), len(self._low)))
+        for index in set(chosen.tolist()):
+            mine = chosen == index
+            actions[mine] = self._policies[index].act(observations[mine])
+        return actions
 
 
 def to_box(squashed: np.ndarray, low: Array, high: Array) -> Array:

@@ -3,11 +3,18 @@
 import ctypes.util
 import os
 import sys
+from functools import cache
 
 from pbcs_ompl.core.errors import MissingDependency
 
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
 """What renders without a display, by the value of MUJOCO_GL."""
+
+
+@cache
+def _has_library(name: str) -> bool:
+    """Return whether a library is installed; to find out starts a process."""
+    return ctypes.util.find_library(name) is not None
 
 
 def prefer_headless_rendering() -> None:
@@ -17,14 +24,14 @@ def prefer_headless_rendering() -> None:
     """
     if "mujoco" in sys.modules:
         return
-    if sys.platform == "linux" and not os.environ.get("DISPLAY") and ctypes.util.find_library("EGL"):
+    if sys.platform == "linux" and not os.environ.get("DISPLAY") and _has_library("EGL"):
         os.environ.setdefault("MUJOCO_GL", "egl")
 
 
 def renderer_is_missing() -> bool:
     """Return whether MUJOCO_GL names a library that is not there: MuJoCo then fails when it is imported."""
     library = LIBRARIES.get(os.environ.get("MUJOCO_GL", "").lower())
-    return library is not None and ctypes.util.find_library(library) is None
+    return library is not None and not _has_library(library)
 
 
 def check_can_render() -> None:

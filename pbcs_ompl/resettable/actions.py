@@ -1,6 +1,7 @@
 """Controls and actions: planners and agents work on boxes of real numbers, environments take members of their space."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Self
 
 import gymnasium
@@ -43,12 +44,12 @@ class ActionMap:
         """
         return cls(*_range(space), tuple(space.shape or ()))
 
-    @property
+    @cached_property
     def low(self) -> Array:
         """Lower bounds of the controls [A]."""
         return self.first.astype(np.float64) - self._margin
 
-    @property
+    @cached_property
     def high(self) -> Array:
         """Upper bounds of the controls [A]."""
         return self.last.astype(np.float64) + self._margin
@@ -63,9 +64,11 @@ class ActionMap:
         values = np.array(controls, dtype=np.float64)
         if self._margin:
             values = np.floor(values + self._margin)
-        actions = np.clip(values, self.first.astype(np.float64), self.last.astype(np.float64)).astype(self.first.dtype)
-        members: Actions = np.clip(actions, self.first, self.last)  # rounding must not lead outside
-        return members.reshape(len(values), *self.shape)
+        first, last = self._bounds
+        actions: Actions = np.minimum(np.maximum(values, first, out=values), last, out=values)
+        if self.first.dtype != np.float64:  # rounding must not lead outside
+            actions = np.minimum(np.maximum(actions.astype(self.first.dtype), self.first), self.last)
+        return actions.reshape(len(values), *self.shape)
 
     def to_action(self, control: Array) -> Any:
         """Return the action for one control [A]."""
@@ -73,13 +76,17 @@ class ActionMap:
 
     def draw(self, rng: np.random.Generator) -> Any:
         """Return a random action: uniform in the box of controls."""
-        return self.to_action(rng.uniform(self.low, self.high))
+        return self.to_action(self.low + (self.high - self.low) * rng.random(len(self.first)))
 
     def to_controls(self, actions: Actions) -> Array:
         """Return controls [B, A] that give actions [B, *shape]."""
         return np.array(actions, dtype=np.float64).reshape(len(actions), len(self.first))
 
-    @property
+    @cached_property
+    def _bounds(self) -> tuple[Array, Array]:
+        return self.first.astype(np.float64), self.last.astype(np.float64)
+
+    @cached_property
     def _margin(self) -> float:
         return 0.5 if self.first.dtype.kind in "iub" else 0.0
 

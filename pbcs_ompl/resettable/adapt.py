@@ -6,7 +6,6 @@ from typing import Any, cast
 
 import gymnasium
 
-from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, NotResettable, NotVerified
 from pbcs_ompl.core.interfaces import GetSetEnv, ResettableModel, VectorisedEnv
 from pbcs_ompl.resettable.actions import ActionMap
@@ -18,7 +17,7 @@ from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
 from pbcs_ompl.resettable.attributes import EnvAttributes, misspelt
 from pbcs_ompl.resettable.families import proved, restorable
-from pbcs_ompl.resettable.fresh import EnvMaker, episode_limit, fresh_maker
+from pbcs_ompl.resettable.fresh import EnvMaker, episode_limit, fresh_maker, spec_of
 from pbcs_ompl.resettable.memory.uncovered import refuse_uncovered
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.resettable.supported import TaskMaker, task_env, task_maker
@@ -112,8 +111,7 @@ def _get_set(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None) 
     proved(model.env, make_inner)
     if offers.goal_distance is not None:
         return _as_model(model)
-    if inner.spec is None:
-        model.spec = EnvSpec(type(bare(inner)).__qualname__)
+    model.spec = spec_of(inner)
     return _as_model(model)
 
 
@@ -124,7 +122,7 @@ def _warn_of_misspelt(env: Any) -> None:
 
 def _model_of(env: RestorableEnv) -> ResettableModel:
     model: GetSetStateModel = MujocoModel(env) if isinstance(env, MujocoEnv) else GetSetStateModel(env)
-    model.spec = replace(model.spec, goal=env.goal_rule, feature=env.feature_rule)
+    model.spec = replace(spec_of(env.inner), goal=env.goal_rule, feature=env.feature_rule)
     return _as_model(model)
 
 

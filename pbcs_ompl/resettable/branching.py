@@ -17,6 +17,7 @@ from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.observing import state_observer
+from pbcs_ompl.resettable.rewards import same_rewards
 from pbcs_ompl.resettable.rules import Outcome
 from pbcs_ompl.resettable.supported import TaskMaker
 
@@ -42,11 +43,11 @@ class Moment(NamedTuple):
             found = _first_index(self.state[name], other.state[name])
             if found is not None:
                 return f"state: {name}{found}"
-        for name in ("observation", "reward", "terminated", "truncated", "success"):
+        for name in ("observation", "terminated", "truncated", "success"):
             found = _first_index(getattr(self, name), getattr(other, name))
             if found is not None:
                 return f"{name}{found}"
-        return ""
+        return "" if same_rewards(self.reward, other.reward) else "reward"
 
 
 def first_difference(env: Any, make_inner: TaskMaker, *, steps: int = SHORT, seed: int = 0) -> str:

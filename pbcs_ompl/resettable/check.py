@@ -22,6 +22,7 @@ from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.attributes import misspelt
 from pbcs_ompl.resettable.branching import LONG, first_difference
 from pbcs_ompl.resettable.make import make
+from pbcs_ompl.resettable.rewards import same_rewards
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.resettable.supported import task_maker
 
@@ -59,7 +60,7 @@ class ResetReport:
 
 @dataclass(frozen=True)
 class _Roll:
-    """States, observations, rewards and ends of a few steps, to be compared bit for bit."""
+    """States, observations, rewards and ends of a few steps, to be compared bit for bit (rewards: `same_rewards`)."""
 
     states: Array
     observations: Array
@@ -72,7 +73,7 @@ class _Roll:
             theirs = vars(other)[name]
             if mine.shape != theirs.shape:
                 return f"{name}: {len(mine)} steps against {len(theirs)}"
-            if not np.array_equal(mine, theirs, equal_nan=True):
+            if not _same(name, mine, theirs):
                 gap = np.nanmax(np.abs(mine.astype(np.float64) - theirs.astype(np.float64)))
                 return f"{name} differ by up to {gap:.3g}"
         return ""
@@ -228,7 +229,7 @@ class _Trial:
         batch = self.model.transition(states, controls)
         parts = [self.model.transition(states[k : k + 1], controls[k : k + 1]) for k in range(len(states))]
         for name, whole, pieces in zip(batch._fields, batch, zip(*parts, strict=True), strict=True):
-            if whole is not None and not np.array_equal(whole, np.concatenate(pieces)):
+            if whole is not None and not _same(name, whole, np.concatenate(pieces)):
                 return f"{name} differ"
         return ""
 
@@ -248,6 +249,10 @@ class _Trial:
             if not np.array_equal(self.env.get_env_state(), state):
                 return f"{state.tolist()} came back as {np.asarray(self.env.get_env_state()).tolist()}"
         return ""
+
+
+def _same(name: str, one: Array, other: Array) -> bool:
+    return same_rewards(one, other) if name == "rewards" else np.array_equal(one, other, equal_nan=True)
 
 
 def _inner(env: Any) -> Any:

@@ -24,7 +24,7 @@ from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rules import GoalRule, Outcome, goal_rule, granted_success
 from pbcs_ompl.resettable.task_env import explored_actions
 
-SIDE_BY_SIDE = 50
+SIDE_BY_SIDE = 100
 """Episodes that a controller drives at the same time, each in an environment of its own."""
 Ending = Literal["goal", "terminated", "truncated", "end of the actions", "time limit"]
 
@@ -183,12 +183,15 @@ def _drive(controller: Controller, episodes: list[_Episode], noise: list[np.rand
     """Let a controller drive episodes side by side until all have ended."""
     actions = ActionMap.of(explored_actions(episodes[0].env))
     controller.reset(len(episodes))
+    observations = np.array([episode.observation for episode in episodes])
+    going = list(range(len(episodes)))
     for _ in range(max_steps):
-        going = [k for k, episode in enumerate(episodes) if episode.ending is None]
+        going = [k for k in going if episodes[k].ending is None]
         if not going:
             break
-        chosen = controller.act(np.array([episode.observation for episode in episodes]))
+        chosen = controller.act(observations.copy())
         for k in going:
             by_chance = epsilon > 0 and noise[k].random() < epsilon
             episodes[k].step(actions.draw(noise[k]) if by_chance else chosen[k])
+            observations[k] = episodes[k].observation
     return [episode.execution("time limit") for episode in episodes]

@@ -147,6 +147,10 @@ def is_known(env_id: str) -> bool:
 
 
 def _find(env_id: str) -> registration.EnvSpec:
+    if env_id.endswith(")"):  # see `fresh.spec_of`
+        raise InvalidOption(f"{env_id} was handed over as an object in wrappers, which its name does not make again; "
+                            f"use it from Python, as in pbcs_ompl.evaluate(chain, env), or register it with its "
+                            f"wrappers: gymnasium.register(..., additional_wrappers=...)")
     module, _, name = env_id.rpartition(":")
     try:
         if module:

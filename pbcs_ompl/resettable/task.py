@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 import gymnasium
 
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.errors import InvalidOption, NotResettable, UnsupportedSpace
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.resettable.adapt import adapt_without_copy
 from pbcs_ompl.resettable.fresh import EnvMaker, fresh_maker, spec_of
 from pbcs_ompl.resettable.make import fresh_env
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule, rule_text
+from pbcs_ompl.resettable.supported import task_env
 
 
 class Task(NamedTuple):
@@ -46,11 +47,20 @@ def task_of(env: str | EnvSpec | gymnasium.Env[Any, Any] | ResettableModel, env_
     if isinstance(env, EnvSpec):
         return _of_spec(replace(env, **given))
     if isinstance(env, gymnasium.Env):
-        return Task(replace(spec_of(env), **given), fresh_maker(env, max_episode_steps))
+        make_env = fresh_maker(env, max_episode_steps)
+        return Task(replace(_spec_with_wrappers(env), **given), make_env)
     if given:
         raise InvalidOption(f"{', '.join(given)}: this model is built already; give them to pbcs_ompl.make")
     model = adapt_without_copy(env)  # refuses what is none
     return Task(model.spec, model.make_env)
+
+
+def _spec_with_wrappers(env: gymnasium.Env[Any, Any]) -> EnvSpec:
+    """Return the spec that a model of `env` has; where it can have none, controllers need none, that of `env`."""
+    try:
+        return spec_of(task_env(env))
+    except (NotResettable, UnsupportedSpace):
+        return spec_of(env)
 
 
 def _of_spec(spec: EnvSpec) -> Task:

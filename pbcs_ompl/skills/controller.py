@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pbcs_ompl.agents.policy import PolicyStack
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable.actions import ActionMap, Actions
-from pbcs_ompl.skills.observed_sets import Entry
+from pbcs_ompl.skills.observed_sets import Entries, Entry
 from pbcs_ompl.skills.policy import SkillPolicy
 
 
@@ -35,7 +36,10 @@ class ChainController:
     def __init__(self, policies: Sequence[SkillPolicy], entries: Sequence[Entry], actions: ActionMap):
         if not policies:
             raise InvalidOption("the skill chain is empty")
-        self._policies, self._entries, self._actions = policies, entries, actions
+        self._policies, self._entries, self._actions = (
+            PolicyStack([policy.actor for policy in policies]), Entries(entries), actions)
+        self._origins = np.array([policy.transform.origin for policy in policies])
+        self._scales = np.array([policy.transform.scale for policy in policies])
         self._single = True
         self.current: IndexArray = np.zeros(1, dtype=np.int64)
 
@@ -64,17 +68,8 @@ class ChainController:
         return actions[0] if self._single else actions
 
     def _switch(self, observations: Array, members: IndexArray) -> None:
-        current = self.current[members]
-        for index in range(1, len(self._policies)):
-            behind = np.flatnonzero(current < index)
-            if len(behind):
-                entered = self._entries[index].contains(observations[behind])
-                current[behind[entered]] = index
-        self.current[members] = current
+        self.current[members] = np.maximum(self.current[members], self._entries.last(observations))
 
     def _act(self, observations: Array, skills: IndexArray) -> Actions:
-        controls = np.empty((len(observations), len(self._actions.first)))
-        for index in np.unique(skills):
-            mine = skills == index
-            controls[mine] = self._policies[index].act(observations[mine])
-        return self._actions.to_actions(controls)
+        seen = (observations - self._origins[skills]) / self._scales[skills]
+        return self._actions.to_actions(self._policies.act(seen, skills))

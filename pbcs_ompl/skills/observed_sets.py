@@ -4,7 +4,7 @@ Training works on states. A controller outside of the simulator has observations
 counterpart that needs nothing else. The success of a chain is measured with these.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.interfaces import ResettableModel
-from pbcs_ompl.core.types import Array, BoolArray
+from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.skills.activation_sets import ClassifierSet, probability
 
 TOLERANCE = 0.02
@@ -44,7 +44,21 @@ class ObservedBall:
 
     def contains(self, observations: Array) -> BoolArray:
         """Return which of the observations [B, O] lie in the ball [B]."""
-        inside: BoolArray = (observations - self.center) ** 2 @ self.weights <= self.radius ** 2
+        return _Balls([self]).contain(observations)[:, 0]
+
+
+class _Balls:
+    """N balls, asked at once."""
+
+    def __init__(self, balls: Sequence[ObservedBall]):
+        self._centers = np.array([ball.center for ball in balls])
+        self._weights = np.array([ball.weights for ball in balls])
+        self._squares = np.array([ball.radius for ball in balls]) ** 2
+
+    def contain(self, observations: Array) -> BoolArray:
+        """Return which of the observations [B, O] lie in which balls [B, N]."""
+        squares = (observations[:, None] - self._centers) ** 2
+        inside: BoolArray = np.einsum("bno,no->bn", squares, self._weights) <= self._squares
         return inside
 
 
@@ -91,6 +105,30 @@ class Entry:
         for part in self.parts:
             inside &= part.contains(observations)
         return inside
+
+
+class Entries:
+    """The entries of S skills; each is asked as `Entry.contains` asks it, and all balls are asked at once."""
+
+    def __init__(self, entries: Sequence[Entry]):
+        self._count = len(entries)
+        owned = [(index, part) for index, entry in enumerate(entries) for part in entry.parts]
+        owners = [index for index, part in owned if isinstance(part, ObservedBall)]
+        self._balls = _Balls([part for _, part in owned if isinstance(part, ObservedBall)])
+        self._owners, self._firsts = np.unique(np.array(owners, dtype=np.int64), return_index=True)
+        self._others = [(index, part) for index, part in owned if not isinstance(part, ObservedBall)]
+
+    def last(self, observations: Array) -> IndexArray:
+        """Return the last entry that each of the observations [B, O] lies in [B]; 0 where it is in none."""
+        inside = np.ones((len(observations), self._count), dtype=np.bool_)
+        if len(self._owners):
+            inside[:, self._owners] = np.logical_and.reduceat(self._balls.contain(observations), self._firsts, axis=1)
+        for index, part in self._others:
+            candidates = np.flatnonzero(inside[:, index])
+            inside[candidates, index] = part.contains(observations[candidates])
+        inside[:, 0] = True
+        last: IndexArray = self._count - 1 - inside[:, ::-1].argmax(axis=1)
+        return last
 
 
 def observed_metric(model: ResettableModel, states: Array, radius: float) -> Array | None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.agents import DDPG, DDPGSettings, Policy
+from pbcs_ompl.agents.policy import PolicyStack
 from pbcs_ompl.core.errors import DamagedFile
 
 
@@ -22,6 +23,17 @@ def test_policy_equals_the_actor_and_its_arrays(layer_norm: bool) -> None:
         actions = policy.act(observations[seed])
         np.testing.assert_allclose(actions, agent.act(observations)[seed], atol=1e-5)
         assert np.array_equal(actions, again.act(observations[seed]))
+
+
+@pytest.mark.parametrize("layer_norm", [False, True])
+def test_a_stack_of_policies_acts_as_each_does(layer_norm: bool) -> None:
+    agent, rng = make(layer_norm), np.random.default_rng(1)
+    policies = [agent.policy(0), agent.policy(1), agent.policy(0)]
+    observations, chosen = rng.normal(size=(60, 3)), rng.integers(0, 3, 60)
+    actions = PolicyStack(policies).act(observations, chosen)
+    for index, policy in enumerate(policies):
+        mine = chosen == index
+        np.testing.assert_array_equal(actions[mine], policy.act(observations[mine]))
 
 
 def test_policy_does_not_change_with_the_agent() -> None:

@@ -89,3 +89,10 @@ def test_plans_hold_the_actions_as_they_are_executed(planner: str, space: gymnas
         observation, _, won, _, _ = env.step(action)
         np.testing.assert_array_equal(observation, state[:2])
     assert won
+
+
+def test_random_actions_are_those_of_numpys_uniform():
+    space = spaces.Box(np.array([-0.3, 2.0, -7.0]), np.array([0.1, 2.5, 100.0]), dtype=np.float64)
+    ours, numpys, actions = np.random.default_rng(5), np.random.default_rng(5), ActionMap.of(space)
+    for _ in range(1_000):
+        np.testing.assert_array_equal(actions.draw(ours), numpys.uniform(space.low, space.high))

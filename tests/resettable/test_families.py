@@ -5,13 +5,15 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.utils import EzPickle
 
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import InvalidState, NotResettable
 from pbcs_ompl.resettable import adapt, check_resettable, make
 from pbcs_ompl.resettable.adapters.classic import AttributeEnv
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel
-from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, child_hash
+from pbcs_ompl.resettable.adapters.visited import CopiedEnv, ReplayedEnv, child_hash, copies_are_faithful
+from pbcs_ompl.resettable.fresh import fresh_maker
 
 
 class Slider(gymnasium.Env):
@@ -182,3 +184,80 @@ def test_a_model_without_rules_has_plain_options() -> None:
     model = make("Pendulum-v1")
     assert model.spec.kwargs == {}
     assert isinstance(model, GetSetStateModel)
+
+
+class Rounding(Slider):
+    """Its reward is a sum in another order after every reset, as over a set whose members lie elsewhere in memory."""
+
+    resets = 0
+
+    def __deepcopy__(self, memo: Any) -> Any:
+        raise TypeError("cannot pickle a simulator")
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        self.resets += 1
+        return super().reset(seed=seed, options=options)
+
+    def step(self, action: Any) -> Any:
+        observation, _, *rest = super().step(action)
+        parts = [0.1, 0.2, 0.3][:: 1 if self.resets % 2 else -1]
+        return observation, sum(parts), *rest
+
+
+def test_rounding_of_rewards_is_no_difference():
+    assert sum([0.1, 0.2, 0.3]) != sum([0.3, 0.2, 0.1])
+    gymnasium.register("tests/Rounding-v0", entry_point=Rounding)
+    try:
+        with pytest.warns(UserWarning, match="replaying"):
+            model = make("tests/Rounding-v0")
+        report = check_resettable(model)
+    finally:
+        gymnasium.registry.pop("tests/Rounding-v0")
+    assert report.ok, report
+
+
+class Server:
+    """A connection that closes when it is deleted."""
+
+    is_open = True
+
+    def __deepcopy__(self, memo: Any) -> "Server":
+        return self  # what is copied is the number of the connection
+
+    def __del__(self) -> None:
+        Server.is_open = False
+
+
+class OnAServer(Slider):
+    def __init__(self) -> None:
+        self.server = Server()
+
+
+def test_what_holds_a_connection_is_not_copied():
+    assert not copies_are_faithful(OnAServer())
+    assert copies_are_faithful(Slider())
+    assert fresh_maker(OnAServer()) is None
+    assert fresh_maker(Slider()) is not None
+
+
+class Forgetful(Slider, EzPickle):
+    """Its copies are made without the option, which its author has forgotten to name."""
+
+    def __init__(self, prize: float = 1.0):
+        EzPickle.__init__(self)
+        self.prize = prize
+
+
+def test_options_that_an_author_forgets_in_copies_are_kept():
+    gymnasium.register("tests/Forgetful-v0", entry_point=Forgetful)
+    try:
+        env = gymnasium.make("tests/Forgetful-v0", prize=7.0)
+        make_env = fresh_maker(env)
+        assert make_env is not None
+        assert make_env().unwrapped.prize == 7.0
+        wrapped = fresh_maker(gymnasium.wrappers.RescaleAction(env, -2.0, 2.0))
+        assert wrapped is not None
+        assert wrapped().action_space.high == 2.0
+        assert wrapped().unwrapped.prize == 7.0
+    finally:
+        gymnasium.registry.pop("tests/Forgetful-v0")

@@ -9,9 +9,10 @@ import pytest
 from gymnasium import spaces, wrappers
 
 import pbcs_ompl.envs  # noqa: F401  registers pbcs/...
-from pbcs_ompl.core.errors import NotResettable
+from pbcs_ompl.core.errors import InvalidOption, NotResettable
 from pbcs_ompl.resettable import adapt, check_resettable, make
 from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.task import task_of
 from pbcs_ompl.resettable.task_env import TaskEnv, explored_actions
 
 Wrap = Callable[[gymnasium.Env[Any, Any]], gymnasium.Env[Any, Any]]
@@ -155,6 +156,15 @@ def test_a_model_does_what_the_wrapped_environment_does(base: Callable[[], Any],
         assert outcome.rewards[0] == pytest.approx(float(reward), abs=1e-12)
         assert outcome.terminated[0] == terminated
         np.testing.assert_allclose(model.observe(state[None])[0], flat(observation), atol=1e-12)
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("wrap", TRANSFORMS.values(), ids=TRANSFORMS)
+def test_the_judge_knows_the_task_by_the_name_that_a_model_has(base: Callable[[], Any], wrap: Wrap) -> None:
+    task, model = task_of(wrap(base())), make(wrap(base()))
+    assert task.spec == model.spec
+    with pytest.raises(InvalidOption, match="in wrappers"):
+        make("Doubled(pbcs/Maze-v0)")
 
 
 def test_transformed_environments_are_resettable() -> None:

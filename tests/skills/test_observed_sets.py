@@ -5,7 +5,14 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.resettable import make
-from pbcs_ompl.skills.observed_sets import observed_ball, observed_metric
+from pbcs_ompl.skills.observed_sets import (
+    Entries,
+    Entry,
+    ObservedBall,
+    ObservedClassifier,
+    observed_ball,
+    observed_metric,
+)
 
 
 def states_of(model, steps=150):
@@ -59,3 +66,24 @@ def test_dictionaries_are_observed_by_their_names():
     seen = model.observe(model.initial_state(3)[None])[0]
     expected = np.concatenate([observation[name] for name in sorted(observation)])
     np.testing.assert_allclose(seen, expected)
+
+
+def test_entries_that_are_asked_together_answer_as_each_does():
+    rng = np.random.default_rng(14)
+
+    def ball():
+        return ObservedBall(rng.random(3), rng.random(3) * (rng.random(3) < 0.7), float(rng.uniform(0.3, 0.8)))
+
+    def classifier():
+        return ObservedClassifier(0.5, rng.random(3), np.ones(3), rng.normal(size=(3, 4)), np.zeros(4),
+                                  rng.normal(size=(4, 1)), np.zeros(1))
+
+    entries = [Entry(), Entry((ball(),)), Entry((ball(), ball())), Entry((ball(), classifier())),
+               Entry((classifier(),)), Entry((ball(), ball(), ball()))]
+    observations = rng.random((500, 3))
+    inside = np.array([entry.contains(observations) for entry in entries])
+    expected = [max(index for index in range(len(entries)) if inside[index, k]) for k in range(500)]
+    assert len(set(expected)) >= 4
+    np.testing.assert_array_equal(Entries(entries).last(observations), expected)
+    for one in (entries[:1], entries[4:5]):
+        assert (Entries(one).last(observations) == 0).all()

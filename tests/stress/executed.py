@@ -19,11 +19,13 @@ def granted(task: dict[str, object], path: Path) -> bool:
         actions, words = file["actions"], json.loads(str(file["metadata"]))
     env = gymnasium.make(task["id"], **task.get("kwargs", {}))
     observation, info = env.reset(seed=words["reset_seed"])
-    for action in actions:
-        assert action in env.action_space
-        observation, reward, terminated, truncated, info = env.step(action)
+    reward, terminated, truncated = 0.0, False, False
+    for action in (None, *actions):
+        if action is not None:
+            assert action in env.action_space
+            observation, reward, terminated, truncated, info = env.step(action)
         if task.get("check"):
-            names = {"obs": observation, "terminated": terminated, "reward": reward, "np": np,
+            names = {"obs": observation, "terminated": terminated,
                      "qpos": getattr(getattr(env.unwrapped, "data", None), "qpos", None)}
             reached = CHECKS[task["check"]](names)
         else:

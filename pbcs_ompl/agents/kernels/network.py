@@ -147,10 +147,24 @@ def polyak_update(sizes: Sizes, weights: np.ndarray, target: np.ndarray, seeds: 
 
 
 @njit()
-def outputs(sizes: Sizes, flat: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """Return the outputs [B, out] of one network for inputs [B, in]."""
-    batch = inputs.shape[0]
-    activations = np.empty(num_activations(sizes, batch), np.float32)
-    activations[: batch * sizes[0]] = inputs.ravel()
-    forward(sizes, flat, 1, 0, activations, batch)
-    return activations[outputs_offset(sizes, batch) :].reshape(batch, sizes[-1])
+def outputs(sizes: Sizes, parameters: np.ndarray, inputs: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return the outputs [B, out] of the networks `chosen` [B], with parameters [N, P], for inputs [B, in]."""
+    fan_in, fan_out = sizes[0], sizes[-1]
+    results = np.empty((len(inputs), fan_out), np.float32)
+    rows = np.empty(len(inputs), np.int64)
+    for network in range(len(parameters)):
+        batch = 0
+        for row in range(len(inputs)):
+            if chosen[row] == network:
+                rows[batch] = row
+                batch += 1
+        if batch == 0:
+            continue
+        activations = np.empty(num_activations(sizes, batch), np.float32)
+        for k in range(batch):
+            activations[k * fan_in : (k + 1) * fan_in] = inputs[rows[k]]
+        forward(sizes, parameters[network], 1, 0, activations, batch)
+        first = outputs_offset(sizes, batch)
+        for k in range(batch):
+            results[rows[k]] = activations[first + k * fan_out : first + (k + 1) * fan_out]
+    return results

@@ -20,7 +20,9 @@ from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap, copied
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.memory.owned import holds_resource
 from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.rewards import same_rewards
 
 FIRST_HASH = float(2**32)
 """Smaller numbers are seeds."""
@@ -191,6 +193,8 @@ def child_hash(name: float, action: Array) -> float:
 
 def copies_are_faithful(env: Any) -> bool:
     """Return whether a deep copy in the middle of an episode continues as the original does."""
+    if holds_resource(env):
+        return False
     rng = np.random.default_rng(0)
     env.reset(seed=0)
     for _ in range(PROOF_STEPS):
@@ -200,7 +204,7 @@ def copies_are_faithful(env: Any) -> bool:
     try:
         copy, spare = deepcopy(env), deepcopy(env)
         theirs = _walk(copy, actions)
-        return _walk(env, actions) == theirs and _walk(spare, actions) == theirs
+        return _same(_walk(env, actions), theirs) and _same(_walk(spare, actions), theirs)
     except Exception:  # whatever a foreign class raises when it is copied: the proof has failed
         return False
 
@@ -213,19 +217,24 @@ def replays(env: Any) -> bool:
     for seed in (0, 1, 0):
         env.reset(seed=seed)
         walks.append(_walk(env, actions))
-    return walks[0] == walks[2]
+    return _same(walks[0], walks[2])
 
 
 def _action(env: Any, rng: np.random.Generator) -> Any:
     return ActionMap.of(env.action_space).draw(rng)
 
 
-def _walk(env: Any, actions: list[Array]) -> list[bytes]:
-    """Return what `env` says to each action, as bytes."""
+def _walk(env: Any, actions: list[Array]) -> list[tuple[bytes, float]]:
+    """Return what `env` says to each action: its observation and whether it terminated, as bytes, and the reward."""
     said = []
     for action in actions:
         observation, reward, terminated, _, _ = env.step(copied(action))
-        said.append(flat(observation).tobytes() + struct.pack("<d?", float(reward), bool(terminated)))
+        said.append((flat(observation).tobytes() + struct.pack("?", bool(terminated)), float(reward)))
         if terminated:
             break
     return said
+
+
+def _same(walk: list[tuple[bytes, float]], other: list[tuple[bytes, float]]) -> bool:
+    return [seen for seen, _ in walk] == [seen for seen, _ in other] and same_rewards(
+        [reward for _, reward in walk], [reward for _, reward in other])

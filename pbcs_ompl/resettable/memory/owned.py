@@ -80,6 +80,15 @@ def look(root: Any) -> Owned:
     return owned
 
 
+def holds_resource(root: Any) -> bool:
+    """Return whether `root` owns an object that releases something when it is deleted, as a connection to a server.
+
+    A deep copy of it, when it is deleted, would release what the original holds.
+    """
+    owned = look(root)
+    return any(hasattr(type(value), "__del__") for value in (*owned.owners.values(), *owned.opaque.values()))
+
+
 def find(root: Any, path: Path) -> Any:
     """Return the value at a path.
 
