@@ -167,7 +167,7 @@ def _train(verb: Parser) -> None:
 
 def _eval(verb: Parser) -> None:
     """run a trained chain of skills, or a robot's follower, many times from the start"""
-    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train")
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train, or ant: the follower that comes with pbcs")
     verb.add_argument("--path", metavar="DIR", help="of a follower: the plan to drive along, a folder of pbcs plan")
     verb.add_argument("--env", metavar="ID", help="of a follower, without --path: drive the shortest way to the goal")
     verb.add_argument("--env-kwargs", type=json_object, default={}, metavar="JSON",

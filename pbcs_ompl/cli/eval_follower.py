@@ -9,11 +9,13 @@ from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import format_number, format_rate
 from pbcs_ompl.results.files import FOLLOWER, TRAJECTORY
 from pbcs_ompl.skills.follow_lines import follow
-from pbcs_ompl.skills.robot_follower import STRUCTURE, RobotFollower
+from pbcs_ompl.skills.robot_follower import STRUCTURE, RobotFollower, shipped_followers
 
 
 def follower_folder(folder: Path) -> Path | None:
-    """Return where a folder has a follower; None where it has none."""
+    """Return where a folder, or one of that name in the package, has a follower; None where there is none."""
+    if not folder.exists() and str(folder) in shipped_followers():
+        return shipped_followers()[str(folder)]
     return next((place for place in (folder / FOLLOWER, folder) if (place / STRUCTURE).is_file()), None)
 
 

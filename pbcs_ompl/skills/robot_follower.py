@@ -12,7 +12,7 @@ import numpy as np
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec, EnvValues
-from pbcs_ompl.core.errors import DamagedFile, InvalidOption
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, UnknownName
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.actions import ActionMap, Actions
@@ -26,6 +26,7 @@ from pbcs_ompl.skills.robot_worlds import robot_of
 
 STRUCTURE, POLICY = "follower.json", "follower.safetensors"
 FORMAT, VERSION = "pbcs_ompl robot follower", 1
+SHIPPED = Path(__file__).parent / "followers"
 GAP = 8.0
 """Longest hop along each axis by which loops of a plan are erased, in spacings of lines (ours)."""
 
@@ -154,6 +155,19 @@ class RobotFollower:
 
     @classmethod
     @checked
+    def shipped(cls, name: str) -> "RobotFollower":
+        """Return a follower that comes with the package, such as "ant" (Gymnasium's, trained by `examples`).
+
+        Raises:
+            UnknownName: no such follower; the message suggests the closest one.
+        """
+        known = shipped_followers()
+        if name not in known:
+            raise UnknownName("follower", name, known)
+        return cls.load(known[name])
+
+    @classmethod
+    @checked
     def load(cls, folder: str | Path, *, trust: bool = False) -> "RobotFollower":
         """Read a follower that `save` wrote.
 
@@ -184,6 +198,11 @@ class RobotFollower:
         low, high = policy.actor.action_low, policy.actor.action_high
         return cls(policy.actor, view, environment, ActionMap(low, high, tuple(words["action_shape"])),
                    words["spacing"], words["clearance"], words["training"])
+
+
+def shipped_followers() -> dict[str, Path]:
+    """Return the folders of the followers that come with the package, by name."""
+    return {path.parent.name: path.parent for path in sorted(SHIPPED.glob(f"*/{STRUCTURE}"))}
 
 
 def _plain(words: dict[str, Any]) -> bytes:
