@@ -14,8 +14,8 @@ from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words
 from pbcs_ompl.results.files import CHAIN
 from pbcs_ompl.results.folder import RunFolder
-from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.evaluation import evaluate
+from pbcs_ompl.skills.load_chain import load_chain
 
 
 def run(arguments: Namespace) -> int:
@@ -27,7 +27,7 @@ def run(arguments: Namespace) -> int:
     if arguments.path or arguments.env or arguments.env_kwargs or arguments.seed:
         raise InvalidOption("--path, --env, --env-kwargs and --seed are for a robot's follower; a chain of skills "
                             "drives where it was trained")
-    chain = SkillChain.load(folder / CHAIN if (folder / CHAIN).is_dir() else folder, trust=arguments.trust)
+    chain = load_chain(folder / CHAIN if (folder / CHAIN).is_dir() else folder, trust=arguments.trust)
     if arguments.video:
         check_video(arguments.video)
     with nullcontext() if arguments.out is None else RunFolder(arguments.out) as out:

@@ -8,7 +8,7 @@ from pbcs_ompl.cli.terminal import print_summary
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import format_number, format_rate
 from pbcs_ompl.results.files import FOLLOWER, TRAJECTORY
-from pbcs_ompl.skills.follow_lines import follow
+from pbcs_ompl.skills.follower_evaluation import evaluate_follower
 from pbcs_ompl.skills.robot_follower import STRUCTURE, RobotFollower, shipped_followers
 
 
@@ -31,7 +31,7 @@ def run(arguments: Namespace, folder: Path) -> int:
     if arguments.path is not None:
         path = Path(arguments.path)
         trajectory = Trajectory.load(path / TRAJECTORY if path.is_dir() else path, trust=arguments.trust)
-    found = follow(follower, arguments.env, trajectory=trajectory, env_kwargs=arguments.env_kwargs,
+    found = evaluate_follower(follower, arguments.env, trajectory=trajectory, env_kwargs=arguments.env_kwargs,
                    episodes=arguments.episodes, epsilon=arguments.epsilon, seed=arguments.seed)
     noise = f", {arguments.epsilon:.0%} random actions" if arguments.epsilon else ""
     lines = [("success", format_rate(found.success_rate, found.wilson)),

@@ -13,7 +13,7 @@ from pbcs_ompl.core.types import Array
 if TYPE_CHECKING:
     from pbcs_ompl.bridge.plan import PlanResult
     from pbcs_ompl.experiments.compare import Comparison
-    from pbcs_ompl.skills.chain import SkillChain
+    from pbcs_ompl.skills.trained_controller import TrainedController
 
 
 def draw(name: str, picture: Callable[[], Any], out: Path) -> None:
@@ -42,14 +42,13 @@ def draw_tree(model: ResettableModel, result: "PlanResult", out: Path) -> None:
     draw("tree.png", picture, out)
 
 
-def draw_chain(model: ResettableModel, chain: "SkillChain", trajectory: Array | None,
+def draw_chain(model: ResettableModel, chain: "TrainedController", trajectory: Array | None,
                rollout: Array | None, title: str, out: Path) -> None:
     """Draw chain.png: phase 1, the chain's rollout and its activation sets."""
     def picture() -> Any:
         from pbcs_ompl.figures.chain import chain_figure
 
-        sets = [(skill.activation.center, skill.activation.radius) for skill in chain.skills]
-        return chain_figure(model, trajectory=trajectory, rollout=rollout, activations=sets, title=title)
+        return chain_figure(model, trajectory=trajectory, rollout=rollout, activations=chain.circles, title=title)
 
     draw("chain.png", picture, out)
 

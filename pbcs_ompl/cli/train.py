@@ -19,7 +19,9 @@ from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words, resume_words
 from pbcs_ompl.results.files import CHAIN, CONFIG, TRAJECTORY
 from pbcs_ompl.results.folder import RunFolder, read_config, read_folder
-from pbcs_ompl.skills import SkillChain, TrainResult, resume, train
+from pbcs_ompl.skills import TrainResult, resume, train
+from pbcs_ompl.skills.load_chain import load_chain
+from pbcs_ompl.skills.trained_controller import TrainedController
 
 
 def run(arguments: Namespace) -> int:
@@ -83,7 +85,7 @@ def _draw_only(out: Path, *, trust: bool, as_json: bool) -> int:
     """Make the picture of a training that was killed after its result."""
     with RunFolder(out, resume=True):
         result = read_folder(out).result or {}
-        chain = SkillChain.load(out / CHAIN, trust=trust) if (out / CHAIN).is_dir() else None
+        chain = load_chain(out / CHAIN, trust=trust) if (out / CHAIN).is_dir() else None
         trajectory = Trajectory.load(out / TRAJECTORY) if (out / TRAJECTORY).exists() else None
         _draw(result, chain, trajectory, out)
     print_summary(result, [("solved" if result["solved"] else "not solved", "ended before; its picture is made now"),
@@ -91,12 +93,12 @@ def _draw_only(out: Path, *, trust: bool, as_json: bool) -> int:
     return 0 if result["solved"] else 1
 
 
-def _draw(result: dict[str, Any], chain: SkillChain | None, trajectory: Trajectory | None, out: Path) -> None:
+def _draw(result: dict[str, Any], chain: TrainedController | None, trajectory: Trajectory | None, out: Path) -> None:
     if chain is None:
         return
     model = make(chain.environment)
     rollout = chain.rollout(model) if result["complete"] else None
-    title = (f"{model.spec.id}: {len(chain.skills)} skills, "
+    title = (f"{model.spec.id}: {chain.num_policies} skills, "
              f"{result['train_transitions']:,} transitions, {result['updates']:,} updates")
     draw_chain(model, chain, None if trajectory is None else trajectory.states, rollout, title, out)
 
@@ -112,7 +114,7 @@ def _closing_lines(arguments: Namespace, result: TrainResult, out: Path) -> list
               f"{format_duration(result.seconds)}")
     lines = [("solved" if result.solved else "not solved", effort)]
     if result.chain is not None:
-        lines.append(("chain", f"{len(result.chain.skills)} skills"))
+        lines.append(("chain", f"{result.chain.num_policies} skills"))
     if result.nominal is not None and result.nominal.steps_median is not None:
         lines.append(("rollout", f"{format_number(result.nominal.steps_median)} steps to the goal without noise"))
     if result.robust is not None:

@@ -3,7 +3,8 @@
 from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.config import TrainConfig, method_settings
 from pbcs_ompl.skills.evaluation import Evaluation, evaluate
-from pbcs_ompl.skills.follow_lines import follow
+from pbcs_ompl.skills.follower_evaluation import evaluate_follower
+from pbcs_ompl.skills.load_chain import load_chain
 from pbcs_ompl.skills.robot_follower import RobotFollower
 from pbcs_ompl.skills.settings import MethodSettings, preset_names
 from pbcs_ompl.skills.train import resume, train
@@ -11,5 +12,5 @@ from pbcs_ompl.skills.train_follower import FollowerResult, resume_follower, tra
 from pbcs_ompl.skills.training import TrainResult
 
 __all__ = ["Evaluation", "FollowerResult", "MethodSettings", "RobotFollower", "Skill", "SkillChain", "TrainConfig",
-           "TrainResult", "evaluate", "follow", "method_settings", "preset_names", "resume", "resume_follower", "train",
-           "train_follower"]
+           "TrainResult", "evaluate", "evaluate_follower", "load_chain", "method_settings", "preset_names", "resume",
+           "resume_follower", "train", "train_follower"]

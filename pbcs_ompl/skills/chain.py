@@ -1,23 +1,23 @@
 """A chain of skills that acts as one policy, can be saved, loaded and evaluated."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import DamagedFile, Mismatch
-from pbcs_ompl.core.interfaces import ResettableModel
-from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
+from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.skills.activation_sets import ActivationSet, Target, from_arrays, kind_of, to_arrays
 from pbcs_ompl.skills.chain_files import read_chain, write_chain
 from pbcs_ompl.skills.controller import ChainController
-from pbcs_ompl.skills.episodes import with_random_actions
 from pbcs_ompl.skills.observed_sets import Entry, entry_from_arrays, entry_kinds, entry_to_arrays
 from pbcs_ompl.skills.policy import SkillPolicy
+from pbcs_ompl.skills.trained_controller import TrainedController, actions_of
 from pbcs_ompl.skills.waypoints import Waypoints
+
+KIND = "skill chain"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,25 +37,8 @@ class Skill:
     entry: Entry
 
 
-@dataclass(frozen=True)
-class Rollouts:
-    """What a batch of executions of a chain did.
-
-    Attributes:
-        success: Which executions reached the environment's goal [B].
-        steps: Steps until then, or until the time limit [B].
-        skills: The index of the skill each execution ended in [B].
-        states: The states of the first execution, for pictures [T+1, D].
-    """
-
-    success: BoolArray
-    steps: IndexArray
-    skills: IndexArray
-    states: Array
-
-
 @dataclass(frozen=True, eq=False)
-class SkillChain:
+class SkillChain(TrainedController):
     """Ordered skills, from the environment's start to its goal; [Matheron2020] section 7.2.
 
     The chain switches to a later skill as soon as that skill's entry is observed, and never goes back.
@@ -86,74 +69,23 @@ class SkillChain:
             steps_per_skill: Time limit of an execution, in steps for each skill.
         """
         model = waypoints.model
-        actions = (ActionMap(model.action_low, model.action_high, model.action_low.shape) if model.env is None
-                   else ActionMap.of(model.env.action_space))
-        return cls(tuple(skills), waypoints.states[0], model.spec, steps_per_skill * len(skills), actions,
+        return cls(tuple(skills), waypoints.states[0], model.spec, steps_per_skill * len(skills), actions_of(model),
                    waypoints.reset_seed)
 
-    def check_belongs_to(self, environment: EnvSpec) -> None:
-        """Raise Mismatch when the chain was trained in another environment."""
-        if not self.environment.same_as(environment):
-            raise Mismatch(f"the skill chain was trained in {self.environment}, not in {environment}")
+    @property
+    def circles(self) -> Sequence[tuple[Array, float]]:
+        """The activation sets, for pictures: states [D] and radii."""
+        return [(skill.activation.center, skill.activation.radius) for skill in self.skills]
+
+    @property
+    def num_policies(self) -> int:
+        """Number of skills."""
+        return len(self.skills)
 
     def controller(self) -> ChainController:
         """Return the chain as a controller of observations, for one episode until its `reset` says otherwise."""
         return ChainController([skill.policy for skill in self.skills], [skill.entry for skill in self.skills],
                                self.actions)
-
-    def rollouts(self, model: ResettableModel, starts: Array, *, epsilon: float = 0.0,
-                 rng: np.random.Generator | None = None, max_steps: int | None = None,
-                 counter: Counter | None = None) -> Rollouts:
-        """Execute the chain from several states side by side, in the model and not in a fresh environment.
-
-        This is for training and for pictures; `evaluate` measures success.
-
-        Args:
-            model: The environment.
-            starts: States [B, D].
-            epsilon: Fraction of actions that are replaced by random ones.
-            rng: Source of random actions.
-            max_steps: Time limit in steps; None for that of the chain.
-            counter: Counts every transition.
-
-        Raises:
-            BudgetUsedUp: in the middle of the executions.
-        """
-        rng, counter = rng or np.random.default_rng(0), counter or Counter()
-        limit = self.time_limit if max_steps is None else max_steps
-        controller = self.controller()
-        controller.reset(len(starts))
-        states, trace = starts.copy(), [starts[0].copy()]
-        success = np.zeros(len(starts), dtype=bool)
-        steps = np.full(len(starts), limit, dtype=np.int64)
-        alive = np.arange(len(starts))
-        for step in range(1, limit + 1):
-            actions = controller.act(model.observe(states[alive]), alive)
-            controls = with_random_actions(model, self.actions.to_controls(actions), epsilon, rng)
-            counter.spend(len(alive))
-            outcome = model.transition(states[alive], controls)
-            states[alive] = outcome.states
-            if alive[0] == 0:
-                trace.append(states[0].copy())
-            success[alive] = outcome.success
-            ended = outcome.success | outcome.ended
-            steps[alive[ended]] = step
-            alive = alive[~ended]
-            if not len(alive):
-                break
-        return Rollouts(success, steps, controller.current, np.array(trace))
-
-    def rollout(self, model: ResettableModel, state: Array | None = None, *, epsilon: float = 0.0,
-                rng: np.random.Generator | None = None, max_steps: int | None = None) -> Array:
-        """Return the states [T+1, D] of one execution.
-
-        Args:
-            model: The environment.
-            state: Where it starts [D]; None for the chain's start.
-            epsilon, rng, max_steps: See `rollouts`.
-        """
-        first = self.start if state is None else state
-        return self.rollouts(model, first[None], epsilon=epsilon, rng=rng, max_steps=max_steps).states
 
     @checked
     def save(self, folder: str | Path) -> None:
@@ -167,7 +99,7 @@ class SkillChain:
             "action_shape": list(self.actions.shape),
             "skills": [{"activation": kind_of(skill.activation), "target": kind_of(skill.target),
                         "entry": entry_kinds(skill.entry)} for skill in self.skills]}
-        write_chain(Path(folder), structure, arrays, [skill.policy for skill in self.skills])
+        write_chain(Path(folder), KIND, structure, arrays, [skill.policy for skill in self.skills])
 
     @classmethod
     @checked
@@ -182,7 +114,7 @@ class SkillChain:
             DamagedFile: a file is missing, truncated, or of another version.
         """
         folder = Path(folder)
-        structure, arrays, policies = read_chain(folder, trust=trust)
+        structure, arrays, policies = read_chain(folder, KIND, trust=trust)
         try:
             skills = tuple(
                 Skill(policy, from_arrays(entry["activation"], arrays, f"activation{index}"),

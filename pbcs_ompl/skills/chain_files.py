@@ -1,7 +1,7 @@
 """The three files of a chain, which are read together: a change of any of them is found by its checksum.
 
-chain.json has the structure, and the SHA-256 of itself and of the other two; chain.npz the sets; chain.safetensors the
-policies.
+chain.json has the structure, and the SHA-256 of itself and of the other two; chain.npz the arrays, such as activation
+sets or a line; chain.safetensors the policies.
 """
 
 import hashlib
@@ -22,7 +22,6 @@ from pbcs_ompl.results.schema import Count, Positive, check
 from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
 
 STRUCTURE, SETS, POLICIES = "chain.json", "chain.npz", "chain.safetensors"
-FORMAT = "pbcs_ompl skill chain"
 VERSION = 5
 
 
@@ -45,12 +44,56 @@ class ChainWords(TypedDict):
     sha256: dict[str, str]
 
 
-def write_chain(folder: Path, structure: dict[str, Any], arrays: Mapping[str, np.ndarray],
+class PlaceWords(TypedDict):
+    """What chain.json says of a policy of a follower."""
+
+    first: Count
+
+
+class FollowerWords(TypedDict):
+    """What chain.json of a follower holds."""
+
+    environment: EnvValues
+    time_limit: Positive
+    reset_seed: Count | None
+    action_shape: list[Count]
+    skills: list[PlaceWords]
+    spacing: float
+    window: float
+    patience: Positive
+    sha256: dict[str, str]
+
+
+KINDS: dict[str, type] = {"skill chain": ChainWords, "follower": FollowerWords}
+"""What a folder may hold, by the name in its format."""
+
+
+def kind_in(folder: Path) -> str:
+    """Return the kind of the chain in a folder.
+
+    Raises:
+        DamagedFile: chain.json is missing, or that of none.
+    """
+    path = folder / STRUCTURE
+    words = read_json(path)
+    found = words.get("format") if isinstance(words, dict) else None
+    kinds = {_format(kind): kind for kind in KINDS}
+    if found not in kinds:
+        raise DamagedFile(f"{path} is not a skill chain")
+    return kinds[found]
+
+
+def _format(kind: str) -> str:
+    return f"pbcs_ompl {kind}"
+
+
+def write_chain(folder: Path, kind: str, structure: dict[str, Any], arrays: Mapping[str, np.ndarray],
                 policies: list[SkillPolicy]) -> None:
     """Write the files of a chain; chain.json last, which makes the other two valid.
 
     Args:
         folder: The folder.
+        kind: One of `KINDS`.
         structure: Plain values, for chain.json.
         arrays: Those of chain.npz.
         policies: Those of the skills.
@@ -61,28 +104,31 @@ def write_chain(folder: Path, structure: dict[str, Any], arrays: Mapping[str, np
     """
     save_policies(folder / POLICIES, policies)
     write_arrays(folder / SETS, **arrays)
-    whole = {"format": FORMAT, "version": VERSION, **structure}
+    whole = {"format": _format(kind), "version": VERSION, **structure}
     sums = {name: _sum(read_bytes(folder / name)) for name in (SETS, POLICIES)}
     write_json(folder / STRUCTURE, {**whole, "sha256": {STRUCTURE: _sum_of_words(whole), **sums}})
 
 
-def read_chain(folder: Path, *, trust: bool) -> tuple[dict[str, Any], dict[str, np.ndarray], list[SkillPolicy]]:
+def read_chain(folder: Path, kind: str, *,
+               trust: bool) -> tuple[dict[str, Any], dict[str, np.ndarray], list[SkillPolicy]]:
     """Return what `write_chain` was given.
 
     Args:
         folder: The folder.
+        kind: One of `KINDS`.
         trust: Accept a chain.json that was changed after it was written, with a warning.
 
     Raises:
         DamagedFile: a file is missing, truncated, of another version, or changed.
     """
     path = folder / STRUCTURE
-    words = read_json(path)
-    if not isinstance(words, dict) or words.get("format") != FORMAT:
-        raise DamagedFile(f"{path} is not a skill chain")
+    found = kind_in(folder)
+    if found != kind:
+        raise DamagedFile(f"{path} is that of a {found}, not of a {kind}; read it with pbcs_ompl.skills.load_chain")
+    words = read_json(path, dict[str, Any])
     if words.get("version") != VERSION:
         raise DamagedFile(f"{path} has version {words.get('version')}, expected {VERSION}")
-    check(path, words, ChainWords)
+    check(path, words, KINDS[kind])
     sums = words.pop("sha256")
     for name in (SETS, POLICIES):
         _compare(folder / name, sums.get(name))

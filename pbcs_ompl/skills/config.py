@@ -19,6 +19,7 @@ from pbcs_ompl.results import schema
 from pbcs_ompl.results.files import read_toml
 from pbcs_ompl.results.schema import check
 from pbcs_ompl.skills.agent_interface import Agent, AgentSettingsValues, load_agent
+from pbcs_ompl.skills.follow import Follow, FollowSettings
 from pbcs_ompl.skills.method import TrainingMethod
 from pbcs_ompl.skills.pbcs import PBCS, PBCSSettings
 from pbcs_ompl.skills.settings import MethodSettings, PlannedSettings, flat_names, read_preset
@@ -54,6 +55,7 @@ METHODS: dict[str, MethodEntry] = {
     "pbcs": MethodEntry(PBCS, PBCSSettings),
     "pb": MethodEntry(PB, PBSettings),
     "backplay": MethodEntry(SlidingWindow, BackplaySettings),
+    "follow": MethodEntry(Follow, FollowSettings),
     "plain": MethodEntry(Plain, PlainSettings),
     "bootstrapped": MethodEntry(Bootstrapped, OfflineSettings),
     "offline": MethodEntry(Offline, OfflineSettings),
@@ -194,9 +196,8 @@ class TrainConfig:
 
     def agent_factory(self, model: ResettableModel) -> Callable[[int], Agent]:
         """Return a function that builds an agent for `model` from a seed."""
-        kind = load_agent(self.agent)
-        return lambda seed: kind(model.observation_size, model.action_low, model.action_high,
-                                 settings=self.agent_settings, seeds=(seed,), device=self.device)
+        kind, spaces = load_agent(self.agent), self.settings.agent_spaces(model)
+        return lambda seed: kind(*spaces, settings=self.agent_settings, seeds=(seed,), device=self.device)
 
 
 def config_modules(values: Mapping[str, Any]) -> list[str]:

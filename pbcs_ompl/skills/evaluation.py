@@ -18,7 +18,7 @@ from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.resettable.judge import Controller, Execution, Judge
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.resettable.task import Task, task_of
-from pbcs_ompl.skills.chain import SkillChain
+from pbcs_ompl.skills.trained_controller import TrainedController
 
 EPISODE_STEPS = 1000
 """Length of an episode where neither the controller nor the environment has a limit."""
@@ -66,7 +66,7 @@ class Evaluation:
 
 
 @checked
-def evaluate(controller: SkillChain | Controller,
+def evaluate(controller: TrainedController | Controller,
              env: str | EnvSpec | gymnasium.Env[Any, Any] | ResettableModel | None = None, *,
              env_kwargs: dict[str, Any] | None = None, goal: str | GoalRule | None = None,
              feature: str | FeatureRule | None = None, start_seed: int | None = None,
@@ -103,7 +103,7 @@ def evaluate(controller: SkillChain | Controller,
         raise InvalidOption("env is None; expected an environment beside env_kwargs, goal, feature, start_seed, "
                             "reset_options and max_episode_steps, or none of them, for the environment that the chain "
                             "was trained in")
-    if isinstance(controller, SkillChain):
+    if isinstance(controller, TrainedController):
         task = task_of(controller.environment if env is None else env, env_kwargs, **rules)
         return evaluate_chain(controller, task, episodes=episodes, epsilon=epsilon, seed=seed)
     if not callable(getattr(controller, "act", None)) or not callable(getattr(controller, "reset", None)):
@@ -119,7 +119,7 @@ def evaluate(controller: SkillChain | Controller,
     return Evaluation.of(executions, epsilon)
 
 
-def evaluate_chain(chain: SkillChain, task: Task, *, episodes: int, epsilon: float, seed: int) -> Evaluation:
+def evaluate_chain(chain: TrainedController, task: Task, *, episodes: int, epsilon: float, seed: int) -> Evaluation:
     """Execute a chain in fresh environments of a task; see `evaluate`.
 
     Args:

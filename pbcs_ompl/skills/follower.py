@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from pbcs_ompl.agents.policy import Policy
+from pbcs_ompl.agents.policy import Policy, PolicyStack
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable.actions import ActionMap, Actions
@@ -41,13 +41,12 @@ class Progress:
 
 
 class View(Protocol):
-    """What a policy sees of the world and of the line.
+    """What a policy sees of the world and of the line."""
 
-    Attributes:
-        window: The longest move of a pointer in a step, a length of the line.
-    """
-
-    window: float
+    @property
+    def window(self) -> float:
+        """The longest move of a pointer in a step, a length of the line."""
+        ...
 
     def features(self, observations: Array) -> Array:
         """Return the features [B, F], in the unit of lines, that observations [B, O] show."""
@@ -97,6 +96,32 @@ class LineView:
                                np.minimum(progress.stalled / self.patience, 1.0)[:, None]], axis=1)
 
 
+class Relay:
+    """Policies that take over from each other at fixed places of a line.
+
+    Args:
+        policies: In the order of execution.
+        firsts: The pointer from which each of them acts, in increasing order; 0 comes first.
+
+    Raises:
+        InvalidOption: there is no policy, or `firsts` does not fit.
+    """
+
+    def __init__(self, policies: Sequence[Policy], firsts: Sequence[int]):
+        if not policies or len(firsts) != len(policies) or firsts[0] != 0 or any(np.diff(firsts) <= 0):
+            raise InvalidOption(f"{len(policies)} policies that act from the pointers {list(firsts)}; expected at "
+                                "least one, from 0 on, in increasing order")
+        self._stack, self._firsts = PolicyStack(policies), np.array(firsts)
+
+    def index(self, pointers: IndexArray) -> IndexArray:
+        """Return the index of the policy that acts at each pointer [B]."""
+        return np.searchsorted(self._firsts, pointers, side="right") - 1
+
+    def act(self, inputs: Array, pointers: IndexArray) -> Array:
+        """Return controls [B, A] for the inputs [B, I] of executions at pointers [B]."""
+        return self._stack.act(inputs, self.index(pointers))
+
+
 class Follower:
     """Drives along a line: a pointer for each episode moves forward on it, and a policy sees where the line leads.
 
@@ -124,10 +149,7 @@ class Follower:
     """
 
     def __init__(self, policies: Sequence[Policy], firsts: Sequence[int], line: Line, view: View, actions: ActionMap):
-        if not policies or len(firsts) != len(policies) or firsts[0] != 0 or any(np.diff(firsts) <= 0):
-            raise InvalidOption(f"{len(policies)} policies that act from the pointers {list(firsts)}; expected at "
-                                "least one, from 0 on, in increasing order")
-        self._policies, self._firsts, self._view, self._actions = policies, np.array(firsts), view, actions
+        self._relay, self._view, self._actions = Relay(policies, firsts), view, actions
         self.line = line
         self.reset()
 
@@ -140,7 +162,7 @@ class Follower:
     @property
     def current(self) -> IndexArray:
         """The index of the policy that acts in each episode [B]."""
-        return np.searchsorted(self._firsts, self.progress.pointers, side="right") - 1
+        return self._relay.index(self.progress.pointers)
 
     def act(self, observation: Array, members: IndexArray | None = None) -> Actions:
         """Return actions, members of the action space.
@@ -160,10 +182,5 @@ class Follower:
         moved = self.progress[chosen].advanced(self.line, self._view.features(observations), self._view.window)
         self.progress.pointers[chosen], self.progress.stalled[chosen] = moved.pointers, moved.stalled
         inputs = self._view.inputs(observations, self.line, moved)
-        controls = np.empty((len(observations), len(self._actions.first)))
-        current = self.current[chosen]
-        for index in np.unique(current):
-            mine = current == index
-            controls[mine] = self._policies[index].act(inputs[mine])
-        actions = self._actions.to_actions(controls)
+        actions = self._actions.to_actions(self._relay.act(inputs, moved.pointers))
         return actions[0] if self._single else actions

@@ -1,6 +1,7 @@
 """The interface of training methods, and the checkpoints from which they resume."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -12,7 +13,7 @@ from pbcs_ompl.core.plain import plain
 from pbcs_ompl.results.arrays import NUMBERS, take, take_words
 from pbcs_ompl.results.files import read_arrays, write_arrays
 from pbcs_ompl.results.schema import CheckpointVersion, CheckpointWords
-from pbcs_ompl.skills.chain import Skill
+from pbcs_ompl.skills.trained_controller import TrainedController
 from pbcs_ompl.skills.trainer import SkillTrainer
 
 VERSION = 4
@@ -47,13 +48,31 @@ class TrainingMethod(Protocol):
         ...
 
     @property
-    def skills(self) -> list[Skill]:
+    def skills(self) -> Sequence[Any]:
         """The skills so far, in the order of execution; the last one leads to the environment's goal."""
         ...
 
     @property
     def covered(self) -> float:
         """Fraction of the plan that the skills so far cover, in [0, 1]."""
+        ...
+
+    @property
+    def standing(self) -> str:
+        """How far training has come, in words: "52% of the plan covered"."""
+        ...
+
+    @property
+    def longest_step(self) -> int:
+        """The most transitions that the next step may take; a larger number where that is not known."""
+        ...
+
+    def chain(self, steps_per_skill: int) -> TrainedController | None:
+        """Return the skills so far as a controller; None where there are none.
+
+        Args:
+            steps_per_skill: Time limit of an execution, in steps for each skill.
+        """
         ...
 
     def snapshot(self) -> Snapshot:

@@ -1,5 +1,6 @@
 """PBCS: a chain of skills, each trained by Backplay, from the goal back to the start; [Matheron2020] Alg. 6."""
 
+import sys
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -106,6 +107,25 @@ class PBCS:
         """Fraction of the plan that the skills so far cover."""
         trained = self.end - self.backplay.state.saved if self.backplay.saved_policy and not self.complete else 0
         return (sum(link.end - link.start for link in self.links) + trained) / self.trainer.waypoints.last
+
+    @property
+    def standing(self) -> str:
+        """How far training has come, in words."""
+        return f"{self.covered:.0%} of the plan covered"
+
+    @property
+    def longest_step(self) -> int:
+        """The most transitions that the next step may take; nothing is known of a verification."""
+        episodes = self.trainer.settings
+        return sys.maxsize if self.complete else 2 * episodes.beta * episodes.max_steps
+
+    def chain(self, steps_per_skill: int) -> SkillChain | None:
+        """Return the skills so far as a chain; None where there are none.
+
+        Args:
+            steps_per_skill: Time limit of an execution, in steps for each skill.
+        """
+        return SkillChain.of(self.skills, self.trainer.waypoints, steps_per_skill) if self.links else None
 
     def step(self) -> None:
         """Do one session or one test of the present skill, or verify the complete chain."""

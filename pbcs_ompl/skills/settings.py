@@ -9,10 +9,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, replace
 from functools import cache
 from importlib.resources import files
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from pbcs_ompl.core.errors import InvalidOption, UnknownName
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.options import check_names, check_range, check_types
+from pbcs_ompl.core.types import Array
 
 
 @dataclass(frozen=True)
@@ -207,6 +209,14 @@ class CriterionSettings(Settings):
         self._check_counts("robust_episodes", "time_limit_factor")
 
 
+class AgentSpaces(NamedTuple):
+    """Length O of what an agent sees, and the box [A] of what it does."""
+
+    observation_size: int
+    action_low: Array
+    action_high: Array
+
+
 @dataclass(frozen=True)
 class MethodSettings(Settings):
     """What can be set in every training method."""
@@ -214,6 +224,10 @@ class MethodSettings(Settings):
     episodes: EpisodeSettings = field(default_factory=EpisodeSettings)
     starts: StartSettings = field(default_factory=StartSettings)
     criterion: CriterionSettings = field(default_factory=CriterionSettings)
+
+    def agent_spaces(self, model: ResettableModel) -> AgentSpaces:
+        """Return what agents of this method see and do: observations and controls of the model."""
+        return AgentSpaces(model.observation_size, model.action_low, model.action_high)
 
     @property
     def steps_per_skill(self) -> int:

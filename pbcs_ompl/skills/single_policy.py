@@ -1,12 +1,13 @@
 """The methods of [Matheron2020] chapters 4 and 5: one policy from the start to the goal."""
 
+import sys
 from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.skills.chain import Skill
+from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.exploration import explore
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.settings import MethodSettings, PlannedSettings
@@ -62,6 +63,24 @@ class SinglePolicy(ABC):
     def covered(self) -> float:
         """Fraction of the plan behind the present start point; without a plan, 0 or 1."""
         return 1.0 if self.done else 1.0 - self.state.start / self.trainer.waypoints.last
+
+    @property
+    def standing(self) -> str:
+        """How far training has come, in words."""
+        return f"{self.covered:.0%} of the plan covered"
+
+    @property
+    def longest_step(self) -> int:
+        """The most transitions that the next step may take: those of a session, and of drawing its start states."""
+        return sys.maxsize if self.done else 2 * self.trainer.settings.beta * self.trainer.settings.max_steps
+
+    def chain(self, steps_per_skill: int) -> SkillChain:
+        """Return the policy as a chain of one skill.
+
+        Args:
+            steps_per_skill: Time limit of an execution.
+        """
+        return SkillChain.of(self.skills, self.trainer.waypoints, steps_per_skill)
 
     def snapshot(self) -> Snapshot:
         """Return everything needed to resume bit for bit."""

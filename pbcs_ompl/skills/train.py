@@ -39,7 +39,7 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
     Args:
         env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model.
         trajectory: A plan made before.
-        method: "pbcs", "pb", "backplay", "plain", "bootstrapped" or "offline".
+        method: "pbcs", "follow", "pb", "backplay", "plain", "bootstrapped" or "offline".
         agent: A registered agent, or module:Class.
         preset: Named settings of the method and of the agent: "fast" or "thesis".
         settings: Settings of the method that differ from the preset, by name ({"epsilon": 0.2}), by path

@@ -110,7 +110,7 @@ class SkillTrainer:
             episodes = self._run(self.explore, starts, self.settings.epsilon)
             self.add_transitions(episodes.states, episodes.controls, episodes.rewards, episodes.next_states,
                                  episodes.terminals)
-            self._train(episodes.transitions)
+            self.train(episodes.transitions)
             successes += episodes.reached.sum()
         return float(successes / len(indices))
 
@@ -207,7 +207,7 @@ class SkillTrainer:
                             rng=self.rng, success_reward=settings.success_reward if settings.shaped else None,
                             counter=self.counter)
 
-    def _train(self, transitions: int) -> None:
+    def train(self, transitions: int) -> None:
         self.updates_due += transitions * self.settings.updates_per_transition
         whole = int(self.updates_due)
         self.updates_due -= whole

@@ -25,11 +25,11 @@ from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY,
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.results.provenance import planning_versions
 from pbcs_ompl.results.schema import PlanEffort
-from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.config import METHODS, TrainConfig
 from pbcs_ompl.skills.evaluation import Evaluation, evaluate_chain
 from pbcs_ompl.skills.method import TrainingMethod, restore, write_checkpoint
 from pbcs_ompl.skills.settings import CriterionSettings, PlannedSettings
+from pbcs_ompl.skills.trained_controller import TrainedController
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
 
@@ -66,7 +66,7 @@ class TrainResult:
     nominal: Evaluation | None
     robust: Evaluation | None
     model_success_rate: float | None
-    chain: SkillChain | None
+    chain: TrainedController | None
     trajectory: Trajectory | None
     waypoints: Array | None
     plan_transitions: int
@@ -85,7 +85,7 @@ class TrainResult:
                 "model_success_rate": self.model_success_rate,
                 "nominal_success_rate": nominal.success_rate if nominal else 0.0,
                 "steps_median": nominal.steps_median if nominal else None,
-                "skills": len(self.chain.skills) if self.chain else 0,
+                "skills": self.chain.num_policies if self.chain else 0,
                 "plan_transitions": self.plan_transitions, "train_transitions": self.train_transitions,
                 "updates": self.updates, "seconds": self.seconds, "seed": self.seed, "out": self.out}
 
@@ -126,9 +126,9 @@ class Training:
 
     def _warm_up(self) -> None:
         """Make an update of an agent that is thrown away: the reported seconds are not those of a compiler."""
-        agent = self.config.agent_factory(self.model)(0)
-        observations = np.zeros((1, WARM_UP_ROWS, self.model.observation_size))
-        actions = np.tile(self.model.action_low, (1, WARM_UP_ROWS, 1))
+        agent, spaces = self.config.agent_factory(self.model)(0), self.settings.agent_spaces(self.model)
+        observations = np.zeros((1, WARM_UP_ROWS, spaces.observation_size))
+        actions = np.tile(spaces.action_low, (1, WARM_UP_ROWS, 1))
         rewards, terminals = np.zeros((1, WARM_UP_ROWS)), np.zeros((1, WARM_UP_ROWS), dtype=np.bool_)
         with code_of_others("the agent"):
             agent.add_transitions(observations, actions, rewards, observations, terminals)
@@ -225,8 +225,7 @@ class Training:
             while not method.done:
                 if not self._step(method):
                     self._checkpoint(method)
-                    return (f"the budget of {self.config.max_transitions} transitions is used up, with "
-                            f"{method.covered:.0%} of the plan covered")
+                    return f"the budget of {self.config.max_transitions} transitions is used up, with {method.standing}"
                 self._report(method)
                 if stops or time.perf_counter() > self.next_checkpoint:
                     self._checkpoint(method)
@@ -240,9 +239,8 @@ class Training:
         A step that needs more than is left is undone, so that a training that is resumed with a larger budget does what
         it would have done with that budget from the beginning.
         """
-        counter, episodes = method.trainer.counter, self.settings.episodes
-        before = None
-        if counter.left < 2 * episodes.beta * episodes.max_steps or method.covered >= 1.0:
+        counter, before = method.trainer.counter, None
+        if counter.left < method.longest_step:
             before = deepcopy(method.snapshot())
         try:
             with code_of_others("the environment or the agent"):
@@ -264,9 +262,7 @@ class Training:
     def _finish(self, method: TrainingMethod | None, trajectory: Trajectory | None, planned: int,
                 ended_early: str | None) -> TrainResult:
         seconds = time.perf_counter() - self.began
-        chain = None
-        if method is not None and method.skills:
-            chain = SkillChain.of(method.skills, method.trainer.waypoints, self.settings.steps_per_skill)
+        chain = None if method is None else method.chain(self.settings.steps_per_skill)
         outcome = _Outcome(ended_early, None, None, None) if ended_early else self._judge(chain, trajectory)
         result = TrainResult(
             solved=outcome.reason is None, reason=outcome.reason, complete=ended_early is None, nominal=outcome.nominal,
@@ -278,7 +274,7 @@ class Training:
         self._write(result)
         return result
 
-    def _judge(self, chain: SkillChain | None, trajectory: Trajectory | None) -> "_Outcome":
+    def _judge(self, chain: TrainedController | None, trajectory: Trajectory | None) -> "_Outcome":
         """Execute a complete chain in fresh environments; without a chain, nothing has to be done in them."""
         criterion, seed = self.settings.criterion, self.config.seed
         task = Task(self.model.spec, self.model.make_env)

@@ -18,7 +18,7 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.envs.maze_maps import MazeMap
 from pbcs_ompl.skills import RobotFollower
-from pbcs_ompl.skills.follow_lines import drive, planned_line, shortest_line
+from pbcs_ompl.skills.follower_evaluation import drive, planned_line, shortest_line
 from pbcs_ompl.skills.free_space import FreeSpace
 from pbcs_ompl.skills.line import Line
 

@@ -11,8 +11,8 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, InvalidState, Mismatch, RunFolderError
 from pbcs_ompl.core.seeding import SeedTree
-from pbcs_ompl.skills.follow_lines import follow
 from pbcs_ompl.skills.follower import Progress
+from pbcs_ompl.skills.follower_evaluation import evaluate_follower
 from pbcs_ompl.skills.free_space import FreeSpace
 from pbcs_ompl.skills.line import Line
 from pbcs_ompl.skills.lines import Lines
@@ -103,8 +103,8 @@ def test_points_follow_lines_in_mazes_that_they_never_saw(trained: FollowerResul
     assert trained.test_rate >= 0.9
     for seed in (21, 22):
         world = {"size": 5, "maze_seed": seed}
-        assert follow(trained.follower, "pbcs/Maze-v0", env_kwargs=world, episodes=5).success_rate == 1.0
-        noisy = follow(trained.follower, "pbcs/Maze-v0", env_kwargs=world, episodes=20, epsilon=0.1, seed=3)
+        assert evaluate_follower(trained.follower, "pbcs/Maze-v0", env_kwargs=world, episodes=5).success_rate == 1.0
+        noisy = evaluate_follower(trained.follower, "pbcs/Maze-v0", env_kwargs=world, episodes=20, epsilon=0.1, seed=3)
         assert noisy.success_rate >= 0.8
         assert noisy.episodes == 20
 
@@ -112,7 +112,7 @@ def test_points_follow_lines_in_mazes_that_they_never_saw(trained: FollowerResul
 def test_it_drives_along_a_plan(trained: FollowerResult) -> None:
     found = plan("pbcs/Maze-v0", "Ex", env_kwargs={"size": 4, "maze_seed": 9}, seed=1)
     assert found.trajectory is not None
-    assert follow(trained.follower, trajectory=found.trajectory, episodes=10).success_rate == 1.0
+    assert evaluate_follower(trained.follower, trajectory=found.trajectory, episodes=10).success_rate == 1.0
 
 
 def test_a_saved_follower_is_the_same_and_a_changed_one_is_refused(trained: FollowerResult, tmp_path: Path) -> None:
@@ -160,9 +160,9 @@ def test_wrong_input_is_named(trained: FollowerResult) -> None:
     with pytest.raises(InvalidOption, match="stalled"):
         train_follower("pbcs/Maze-v0", settings={"standing": 0.9, "advanced": 0.9})
     with pytest.raises(Mismatch, match="observations or actions differ"):
-        follow(trained.follower, "pbcs/Maze-v0", env_kwargs={"normalize_actions": True})
+        evaluate_follower(trained.follower, "pbcs/Maze-v0", env_kwargs={"normalize_actions": True})
     with pytest.raises(InvalidOption, match="expected an environment, or a plan"):
-        follow(trained.follower)
+        evaluate_follower(trained.follower)
     with pytest.raises(InvalidOption, match="3 entries; expected the 2"):
         trained.follower.controller(Line(np.zeros((2, 2)), 0.1), entries=[0, 1, 2])
     with pytest.raises(InvalidOption, match="in its plane"):

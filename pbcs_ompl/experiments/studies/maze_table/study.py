@@ -5,7 +5,7 @@ from typing import Any
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.experiments.training_run import trained
 from pbcs_ompl.resettable import make
-from pbcs_ompl.skills.chain import SkillChain
+from pbcs_ompl.skills.trained_controller import TrainedController
 
 PICTURED_INDEX = 0
 
@@ -33,7 +33,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     return settings | record
 
 
-def _picture(chain: SkillChain, plan: Trajectory | None, kwargs: dict[str, Any]) -> dict[str, Any]:
+def _picture(chain: TrainedController, plan: Trajectory | None, kwargs: dict[str, Any]) -> dict[str, Any]:
     return {"plan": None if plan is None else plan.states.tolist(),
             "rollout": chain.rollout(make("pbcs/Maze-v0", kwargs)).tolist(),
-            "activations": [[skill.activation.center.tolist(), skill.activation.radius] for skill in chain.skills]}
+            "activations": [[center.tolist(), radius] for center, radius in chain.circles]}

@@ -26,9 +26,10 @@ EXTRA = 4
 
 
 @checked
-def follow(follower: RobotFollower, env: str | EnvSpec | gymnasium.Env[Any, Any] | ResettableModel | None = None, *,
-           trajectory: Trajectory | None = None, env_kwargs: dict[str, Any] | None = None, episodes: int = 100,
-           epsilon: float = 0.0, seed: int = 0) -> Evaluation:
+def evaluate_follower(follower: RobotFollower,
+                      env: str | EnvSpec | gymnasium.Env[Any, Any] | ResettableModel | None = None, *,
+                      trajectory: Trajectory | None = None, env_kwargs: dict[str, Any] | None = None,
+                      episodes: int = 100, epsilon: float = 0.0, seed: int = 0) -> Evaluation:
     """Let a follower drive along a line in fresh environments, from their own starts, without any training.
 
     Args:
@@ -60,13 +61,13 @@ def follow(follower: RobotFollower, env: str | EnvSpec | gymnasium.Env[Any, Any]
 
 def drive(follower: RobotFollower, model: ResettableModel, line: Line, *, episodes: int, epsilon: float = 0.0,
           seed: int = 0, entries: Sequence[int] | None = None) -> Evaluation:
-    """Let a follower drive along a line; see `follow`.
+    """Let a follower drive along a line; see `evaluate_follower`.
 
     Args:
         follower: Of the same robot.
         model: Its fresh environments are driven in.
         line: Where to go.
-        episodes, epsilon, seed: See `follow`.
+        episodes, epsilon, seed: See `evaluate_follower`.
         entries: Of the observation; see `RobotFollower.controller`.
     """
     near, patience = float(follower.view.distances.min()), follower.view.patience

@@ -1,0 +1,320 @@
+"""Path following: one policy along the whole plan, and more only where one does not succeed."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from pbcs_ompl.agents.policy import Policy
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, IndexArray
+from pbcs_ompl.skills.follow_chain import FollowChain
+from pbcs_ompl.skills.follow_task import LOOKS, FollowTask, LineSettings, Position
+from pbcs_ompl.skills.follower import Progress, Relay
+from pbcs_ompl.skills.method import Snapshot
+from pbcs_ompl.skills.sequential_test import SequentialTest
+from pbcs_ompl.skills.settings import AgentSpaces, PlannedSettings
+from pbcs_ompl.skills.trainer import SkillTrainer
+
+TRIALS_AT_ONCE = 10
+"""Noisy executions of a test side by side; the sequential test is asked after each such batch."""
+SHORTEST_SESSION = 250
+"""Transitions of a session along a short line."""
+
+
+@dataclass(frozen=True)
+class FollowSettings(PlannedSettings):
+    """Settings of the method "follow"; those of the groups `starts` and `plan` have no meaning for it.
+
+    A step is worth progress_reward * (its progress, in steps) - effort_cost * (mean square of the action, in [-1, 1]),
+    and `episodes.success_reward` more where it reaches the end.
+
+    Attributes:
+        line: The plan as a line, and how policies see it.
+        gate: When a policy passes.
+        progress_reward: For the progress of a step (ours: with 1, the actor saturates and fewer mazes are solved).
+        effort_cost: For the largest action (ours: without it, actions saturate; 0.3 solves more mazes than 0.15).
+        action_noise: Deviation of the noise on actions in training, actions in [-1, 1] (ours; 0.3 to 0.5 were equal).
+        start_fraction: Fraction of episodes that begin in the plan's first state, not anywhere on it (ours, not tuned).
+        session_lengths: Transitions of a session between two tests, in hops of the plan without its loops (ours: a test
+            without noise costs about a tenth).
+        attempts: Tests that a policy may fail before the line is split (ours, not tuned).
+    """
+
+    line: LineSettings = field(default_factory=LineSettings)
+    gate: SequentialTest = field(default_factory=SequentialTest)
+    progress_reward: float = 0.3
+    effort_cost: float = 0.3
+    action_noise: float = 0.3
+    start_fraction: float = 0.1
+    session_lengths: int = 10
+    attempts: int = 10
+
+    def _check_ranges(self) -> None:
+        self._check_positive("progress_reward")
+        self._check("at least 0", lambda value: value >= 0, "effort_cost", "action_noise")
+        self._check_fractions("start_fraction")
+        self._check_counts("session_lengths", "attempts")
+
+    def agent_spaces(self, model: ResettableModel) -> AgentSpaces:
+        """Return what agents see, as `LineView` shows it, and do: controls scaled to [-1, 1]."""
+        ones = np.ones(len(model.action_low))
+        return AgentSpaces(model.observation_size + len(LOOKS) * len(model.feature_low) + 1, -ones, ones)
+
+
+class Member(NamedTuple):
+    """A policy, and the pointer from which it acts."""
+
+    first: int
+    policy: Policy
+
+
+class Verdict(NamedTuple):
+    """The result of a test: whether the policy passed, its success rate with noise, where its failures ended."""
+
+    passed: bool
+    rate: float
+    blocked: int
+
+
+@dataclass
+class FollowState:
+    """The variables of the loop.
+
+    Attributes:
+        end: The pointer at which the present policy ends; beyond the line, it ends at the environment's goal.
+        phase: What comes next: "train", "test" or "split".
+        tests: Tests that the present policy has failed.
+        best_rate, best_blocked: Those of its best test so far.
+        candidate: The pointer from which the best policy is tried next, in a split.
+        passed: Whether the policies lead from the start to the goal.
+    """
+
+    end: int
+    phase: str = "train"
+    tests: int = 0
+    best_rate: float = -1.0
+    best_blocked: int = 0
+    candidate: int = 0
+    passed: bool = False
+
+
+class Follow:
+    """Trains one policy to move along the plan, from states all along it, until it passes a sequential test.
+
+    A test executes the policy from the start once without noise and, if that succeeds, with random actions until the
+    sequential test has an answer. After `attempts` failed tests the line is split: the best policy is tried from where
+    its failures ended. From the first place where it passes it is kept to the end, and a new policy is trained up to
+    there. Where it passes nowhere, training begins again with new networks.
+
+    Source: ours. Starts all along a demonstration are those of DeepMimic (Peng et al. 2018, "reference state
+    initialization"); the split is the idea of [Matheron2020] chapter 7.
+    """
+
+    def __init__(self, trainer: SkillTrainer, settings: FollowSettings):
+        self.trainer, self.settings = trainer, settings
+        self.task = FollowTask.of(trainer.model, trainer.waypoints.states, settings.line)
+        low, high = trainer.model.action_low, trainer.model.action_high
+        self._middle, self._half = (high + low) / 2.0, (high - low) / 2.0
+        self.members: list[Member] = []
+        """Finished policies, in the order of execution."""
+        self.best: Policy | None = None
+        self._train_to(self.task.line.last + 1)
+
+    def _train_to(self, end: int) -> None:
+        """Train a policy from the start to the pointer `end` from now on."""
+        self.state = FollowState(end)
+        self.best = None
+        self._position = self._fresh(self.trainer.settings.episodes_per_batch)
+        self._steps = np.zeros(len(self._position.states), dtype=np.int64)
+
+    @property
+    def done(self) -> bool:
+        """Whether the policies lead from the start to the goal."""
+        return self.state.passed
+
+    @property
+    def skills(self) -> Sequence[Member]:
+        """The policies that have passed a test, in the order of execution."""
+        return self.members
+
+    @property
+    def covered(self) -> float:
+        """Fraction of the line that the best policy so far has come along, with those after it."""
+        finished = self.task.line.last + 1 - self.state.end
+        return 1.0 if self.done else (finished + min(self.state.best_blocked, self.state.end)) / (
+            self.task.line.last + 1)
+
+    @property
+    def standing(self) -> str:
+        """How far training has come, in words."""
+        rate, last = max(0.0, self.state.best_rate), max(1, self.task.line.last)
+        return (f"{rate:.0%} of the noisy executions of the best policy successful, its failures at "
+                f"{self.state.best_blocked / last:.0%} of the line")
+
+    @property
+    def longest_step(self) -> int:
+        """The most transitions that a step may take."""
+        return max(self._session_transitions, (self.settings.gate.most_trials + TRIALS_AT_ONCE + 1) * self._max_steps)
+
+    @property
+    def _session_transitions(self) -> int:
+        return max(SHORTEST_SESSION, self.settings.session_lengths * self.task.hops)
+
+    @property
+    def _max_steps(self) -> int:
+        """Time limit of an execution along the whole line, in steps."""
+        return self.settings.criterion.time_limit_factor * max(self.task.hops, self.settings.episodes.max_steps)
+
+    def chain(self, steps_per_skill: int) -> FollowChain:
+        """Return the finished policies as a controller; before they lead from the start, with the best of the present.
+
+        Args:
+            steps_per_skill: Shortest time limit of an execution.
+        """
+        first = [] if self.done else [Member(0, self.best or self._policy())]
+        return FollowChain.of([*first, *self.members], self.task, self.trainer.waypoints,
+                              max(steps_per_skill, self._max_steps))
+
+    def step(self) -> None:
+        """Train for a session, test the policy, or try the best one from another place."""
+        if self.state.phase == "train":
+            for _ in range(-(-self._session_transitions // len(self._steps))):
+                self._train_step()
+            self.state.phase = "test"
+        elif self.state.phase == "test":
+            self._test()
+        else:
+            self._split()
+
+    def _train_step(self) -> None:
+        """Make one step of all episodes, and the updates that are due."""
+        trainer, task, position = self.trainer, self.task, self._position
+        inputs = task.inputs(position)
+        actions = self._explore(inputs)
+        trainer.counter.spend(len(actions))
+        after = task.step(position, self._middle + self._half * actions)
+        progress = after.position.progress
+        reached = after.success | (progress.pointers >= self.state.end)
+        terminals = reached | after.terminated | (progress.stalled >= self.settings.line.patience)
+        rewards = (self.settings.progress_reward * after.gains - self.settings.effort_cost * (actions ** 2).mean(axis=1)
+                   + trainer.settings.success_reward * reached)
+        trainer.agent.add_transitions(inputs[None], actions[None], rewards[None], task.inputs(after.position)[None],
+                                      terminals[None])
+        self._steps += 1
+        over = np.flatnonzero(terminals | after.ended | (self._steps >= trainer.settings.max_steps))
+        self._position = after.position
+        if len(over):
+            self._position.put(over, self._fresh(len(over)))
+            self._steps[over] = 0
+        trainer.train(len(actions))
+
+    def _explore(self, inputs: Array) -> Array:
+        """Return actions [B, A] in [-1, 1]: the agent's with noise, a few of them random."""
+        trainer = self.trainer
+        actions: Array = trainer.agent.explore(inputs[None])[0]
+        actions = np.clip(actions + self.settings.action_noise * trainer.rng.standard_normal(actions.shape), -1.0, 1.0)
+        chosen = trainer.rng.random(len(actions)) < trainer.settings.epsilon
+        actions[chosen] = trainer.rng.uniform(-1.0, 1.0, (int(chosen.sum()), actions.shape[1]))
+        return actions
+
+    def _fresh(self, count: int) -> Position:
+        """Return `count` executions that begin in states all along the plan up to the end, some in the first."""
+        rng = self.trainer.rng
+        places = rng.integers(0, max(1, self.task.place(self.state.end)), count)
+        places[rng.random(count) < self.settings.start_fraction] = 0
+        return self.task.at(places)
+
+    def _policy(self) -> Policy:
+        """Return the agent's policy, acting on the environment's controls."""
+        model = self.trainer.model
+        return replace(self.trainer.agent.policy(0), action_low=model.action_low.copy(),
+                       action_high=model.action_high.copy())
+
+    def _test(self) -> None:
+        """Test the policy from the start; keep it if it passes, or if it is the best so far."""
+        state, policy = self.state, self._policy()
+        found = self._try(policy, 0)
+        if found.passed:
+            self.members.insert(0, Member(0, policy))
+            state.passed = True
+            return
+        state.tests += 1
+        if (found.rate, found.blocked) > (state.best_rate, state.best_blocked):
+            self.best, state.best_rate, state.best_blocked = policy, found.rate, found.blocked
+        state.phase = "train"
+        if state.tests >= self.settings.attempts:
+            state.phase, state.candidate = "split", self._beyond(state.best_blocked)
+
+    def _split(self) -> None:
+        """Try the best policy from the candidate on; keep it from there, or move on to beyond its failures."""
+        state = self.state
+        if self.best is None or state.candidate >= min(state.end, self.task.line.last):
+            self.members = []
+            self._begin_again(self.task.line.last + 1)
+            return
+        found = self._try(self.best, state.candidate)
+        if found.passed:
+            self.members.insert(0, Member(state.candidate, self.best))
+            self._begin_again(state.candidate)
+        else:
+            state.candidate = max(self._beyond(found.blocked), state.candidate + 1)
+
+    def _begin_again(self, end: int) -> None:
+        self.trainer.restart()
+        self._train_to(end)
+
+    def _beyond(self, pointer: int) -> int:
+        """Return the pointer one window after another."""
+        return pointer + max(1, round(self.settings.line.window / self.task.line.spacing))
+
+    def _try(self, policy: Policy, first: int) -> Verdict:
+        """Test a policy, and the finished ones after it, from a pointer on."""
+        relay = Relay([policy, *(member.policy for member in self.members)],
+                      [0, *(member.first for member in self.members)])
+        place = self.task.place(first)
+        blocked = self._failures(relay, place, 1, 0.0)
+        if len(blocked):
+            return Verdict(False, 0.0, int(blocked[0]))
+        trials, passed = 0, None
+        while passed is None:
+            blocked = np.concatenate([blocked, self._failures(relay, place, TRIALS_AT_ONCE,
+                                                              self.trainer.settings.test_epsilon)])
+            trials += TRIALS_AT_ONCE
+            passed = self.settings.gate.verdict(trials - len(blocked), trials)
+        return Verdict(passed, 1.0 - len(blocked) / trials, int(blocked.max(initial=0)))
+
+    def _failures(self, relay: Relay, place: int, count: int, epsilon: float) -> IndexArray:
+        """Return where those of `count` executions that fail come to their ends [at most count]."""
+        tries = self.task.execute(relay, np.full(count, place), epsilon=epsilon, max_steps=self._max_steps,
+                                  patience=4 * self.settings.line.patience, rng=self.trainer.rng,
+                                  counter=self.trainer.counter)
+        return tries.pointers[~tries.success]
+
+    def snapshot(self) -> Snapshot:
+        """Return everything needed to resume bit for bit."""
+        plain, arrays = self.trainer.state()
+        policies = [member.policy for member in self.members] + ([self.best] if self.best else [])
+        for index, policy in enumerate(policies):
+            arrays |= {f"policy{index}.{name}": array for name, array in policy.to_arrays().items()}
+        progress = self._position.progress
+        arrays |= {"episode.states": self._position.states, "episode.pointers": progress.pointers,
+                   "episode.stalled": progress.stalled, "episode.steps": self._steps}
+        return Snapshot({"trainer": plain, "state": asdict(self.state), "policies": len(policies),
+                         "firsts": [member.first for member in self.members]}, arrays)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Resume from what `snapshot` returned."""
+        plain, arrays = snapshot.plain, snapshot.arrays
+        policies = [Policy.from_arrays({name.partition(".")[2]: array for name, array in arrays.items()
+                                        if name.startswith(f"policy{index}.")}) for index in range(plain["policies"])]
+        self.members = [Member(*pair) for pair in zip(plain["firsts"], policies, strict=False)]
+        self.best = policies[-1] if len(policies) > len(self.members) else None
+        self.trainer.restore(plain["trainer"], {name: array for name, array in arrays.items()
+                                                if not name.startswith(("policy", "episode."))})
+        self.state = FollowState(**plain["state"])
+        states = arrays["episode.states"].copy()
+        progress = Progress(arrays["episode.pointers"].copy(), arrays["episode.stalled"].copy())
+        self._position = Position(states, self.trainer.model.observe(states), progress)
+        self._steps = arrays["episode.steps"].copy()

@@ -1,0 +1,118 @@
+"""The result of path following: policies along a line, saved, loaded and evaluated as a chain is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pbcs_ompl.agents.policy import Policy
+from pbcs_ompl.core.checked import checked
+from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.errors import DamagedFile
+from pbcs_ompl.core.types import Array
+from pbcs_ompl.resettable.actions import ActionMap
+from pbcs_ompl.skills.chain_files import read_chain, write_chain
+from pbcs_ompl.skills.follow_task import FollowTask
+from pbcs_ompl.skills.follower import Follower, LineView
+from pbcs_ompl.skills.line import Line
+from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
+from pbcs_ompl.skills.trained_controller import TrainedController, actions_of
+from pbcs_ompl.skills.waypoints import Waypoints
+
+KIND = "follower"
+
+
+@dataclass(frozen=True, eq=False)
+class FollowChain(TrainedController):
+    """Policies that take over from each other along one line, from the environment's start to its goal.
+
+    Attributes:
+        policies: In the order of execution.
+        firsts: The pointer from which each of them acts.
+        line: Along the plan.
+        view: What the policies see.
+        start, environment, time_limit, actions, reset_seed: See `TrainedController`.
+    """
+
+    policies: tuple[Policy, ...]
+    firsts: tuple[int, ...]
+    line: Line
+    view: LineView
+    start: Array
+    environment: EnvSpec
+    time_limit: int
+    actions: ActionMap
+    reset_seed: int | None = None
+
+    @classmethod
+    def of(cls, members: Sequence[tuple[int, Policy]], task: FollowTask, waypoints: Waypoints,
+           time_limit: int) -> "FollowChain":
+        """Return trained policies as a controller.
+
+        Args:
+            members: The pointer from which a policy acts, and the policy, in the order of execution.
+            task: The line, and what they see.
+            waypoints: Those of the plan.
+            time_limit: Steps after which an execution counts as failed.
+        """
+        firsts, policies = zip(*members, strict=True)
+        return cls(policies, firsts, task.line, task.view, waypoints.states[0], task.model.spec, time_limit,
+                   actions_of(task.model), waypoints.reset_seed)
+
+    @property
+    def circles(self) -> Sequence[tuple[Array, float]]:
+        """None: policies take over at places of the line."""
+        return []
+
+    @property
+    def num_policies(self) -> int:
+        """Number of policies."""
+        return len(self.policies)
+
+    def controller(self) -> Follower:
+        """Return the controller of observations, for one episode until its `reset` says otherwise."""
+        return Follower(self.policies, self.firsts, self.line, self.view, self.actions)
+
+    @checked
+    def save(self, folder: str | Path) -> None:
+        """Write chain.json (structure), chain.npz (the line, what policies see) and chain.safetensors (policies)."""
+        view = self.view
+        arrays = {"start": self.start, "first_action": self.actions.first, "last_action": self.actions.last,
+                  "points": self.line.points, "entries": view.entries, "unit": view.unit,
+                  "origin": view.normaliser.origin, "scale": view.normaliser.scale, "distances": view.distances}
+        structure = {
+            "environment": self.environment.to_dict(), "time_limit": self.time_limit, "reset_seed": self.reset_seed,
+            "action_shape": list(self.actions.shape), "skills": [{"first": int(first)} for first in self.firsts],
+            "spacing": self.line.spacing, "window": view.window, "patience": view.patience}
+        write_chain(Path(folder), KIND, structure, arrays,
+                    [SkillPolicy(policy, ObservationTransform.identity(view.size)) for policy in self.policies])
+
+    @classmethod
+    @checked
+    def load(cls, folder: str | Path, *, trust: bool = False) -> "FollowChain":
+        """Read what `save` wrote.
+
+        Args:
+            folder: The folder.
+            trust: Let its environment be made where that imports a module which the folder names.
+
+        Raises:
+            DamagedFile: a file is missing, truncated, or of another version.
+        """
+        folder = Path(folder)
+        structure, arrays, policies = read_chain(folder, KIND, trust=trust)
+        try:
+            view = LineView(arrays["entries"].astype(np.int64), arrays["unit"],
+                            ObservationTransform(arrays["origin"], arrays["scale"]), arrays["distances"],
+                            structure["window"], structure["patience"])
+            actions = ActionMap(arrays["first_action"], arrays["last_action"], tuple(structure["action_shape"]))
+            return cls(tuple(policy.actor for policy in policies),
+                       tuple(place["first"] for place in structure["skills"]),
+                       Line(arrays["points"], structure["spacing"]), view, arrays["start"],
+                       EnvSpec.from_dict(structure["environment"], trusted=trust), structure["time_limit"], actions,
+                       structure["reset_seed"])
+        except (KeyError, ValueError, TypeError, IndexError) as error:
+            raise DamagedFile(f"{folder} holds a damaged follower: {error}") from error
+
+

@@ -1,0 +1,211 @@
+"""The task of a follower: a plan as a line, and executions along it."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from pbcs_ompl.core.errors import Mismatch
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
+from pbcs_ompl.skills.episodes import with_random_actions
+from pbcs_ompl.skills.follower import LineView, Progress, Relay
+from pbcs_ompl.skills.line import Line, arc_lengths, erase_loops
+from pbcs_ompl.skills.policy import ObservationTransform
+from pbcs_ompl.skills.settings import Settings
+
+LOOKS = (1.0, 2.0, 4.0)
+"""How far policies look ahead, in multiples of `LineSettings.look_ahead`."""
+STEP_QUANTILE = 0.9
+"""Of the movements in a step along a plan, the one that is the unit: a blow against a wall is larger than a step."""
+TOLERANCE = 1e-5
+"""Largest difference between a feature and the entry of the observation that shows it, relative to its size."""
+
+
+@dataclass(frozen=True)
+class LineSettings(Settings):
+    """How a plan becomes a line, and how far policies look ahead on it.
+
+    Lengths are in steps: along each feature dimension, nine tenths of the steps of the plan move by at most 1. So the
+    values hold in any environment.
+
+    Attributes:
+        spacing: Between the points of the line (ours, not tuned).
+        look_ahead: Policies see the line 1, 2 and 4 times this ahead (ours; with 2, fewer mazes were solved).
+        window: The longest move of a pointer in a step (ours; with 8, fewer mazes were solved).
+        patience: Steps without progress after which an episode has failed (ours; 20 and 40 were equal in mazes).
+    """
+
+    spacing: float = 0.5
+    look_ahead: float = 1.0
+    window: float = 4.0
+    patience: int = 20
+
+    def _check_ranges(self) -> None:
+        self._check_positive("spacing", "look_ahead", "window")
+        self._check_counts("patience")
+
+
+@dataclass(frozen=True, eq=False)
+class Position:
+    """Where executions are: states [B, D], what is observed there [B, O], and their progress on the line."""
+
+    states: Array
+    observations: Array
+    progress: Progress
+
+    def __getitem__(self, members: IndexArray) -> "Position":
+        return Position(self.states[members], self.observations[members], self.progress[members])
+
+    def put(self, members: IndexArray, others: "Position") -> None:
+        """Let some executions be others from now on."""
+        self.states[members], self.observations[members] = others.states, others.observations
+        self.progress.pointers[members] = others.progress.pointers
+        self.progress.stalled[members] = others.progress.stalled
+
+
+@dataclass(frozen=True, eq=False)
+class FollowStep:
+    """What one step of some executions did.
+
+    Attributes:
+        position: Where they are now.
+        gains: Progress along the line, in steps [B].
+        success: Which reached the environment's goal [B].
+        terminated, ended: Which episodes the environment terminated, and which it ended for whatever reason [B].
+    """
+
+    position: Position
+    gains: Array
+    success: BoolArray
+    terminated: BoolArray
+    ended: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class Tries:
+    """What executions did: which succeeded [B], and how far they came on the line [B]."""
+
+    success: BoolArray
+    pointers: IndexArray
+
+
+@dataclass(frozen=True, eq=False)
+class FollowTask:
+    """A plan as a line, and executions along it.
+
+    Attributes:
+        model: The environment.
+        line: Through the features of the plan without its loops, in steps.
+        view: What policies see.
+        states: The states of the plan [T+1, D].
+        pointers: Where they are on the line [T+1]; those of a loop are where it begins.
+        hops: Number of states in the plan without its loops, less one.
+    """
+
+    model: ResettableModel
+    line: Line
+    view: LineView
+    states: Array
+    pointers: IndexArray
+    hops: int
+
+    @classmethod
+    def of(cls, model: ResettableModel, states: Array, settings: LineSettings) -> Self:
+        """Return the task of following the states of a plan [T+1, D].
+
+        Raises:
+            Mismatch: the observation does not show the feature.
+        """
+        observations = model.observe(states)
+        entries = feature_entries(model, states, observations)
+        features = observations[:, entries]
+        steps = np.quantile(np.abs(np.diff(features, axis=0)), STEP_QUANTILE, axis=0)
+        unit = np.where(steps > 0, steps, 1.0)
+        kept = erase_loops(features / unit, 1.0)
+        corners = features[kept] / unit
+        line = Line.through(corners, settings.spacing)
+        hop = np.searchsorted(kept, np.arange(len(states)), side="right") - 1
+        deviation = observations.std(axis=0)
+        normaliser = ObservationTransform(observations.mean(axis=0), np.where(deviation > 1e-9, deviation, 1.0))
+        view = LineView(entries, unit, normaliser, settings.look_ahead * np.array(LOOKS), settings.window,
+                        settings.patience)
+        return cls(model, line, view, states, line.pointer_at(arc_lengths(corners))[hop], len(kept) - 1)
+
+    def place(self, pointer: int) -> int:
+        """Return the number of the first state of the plan that is at a pointer or beyond."""
+        return min(int(np.searchsorted(self.pointers, pointer)), len(self.states) - 1)
+
+    def at(self, places: IndexArray) -> Position:
+        """Return executions that begin in the states of the plan number `places` [B]."""
+        states = self.states[places]
+        return Position(states, self.model.observe(states), Progress.at(self.pointers[places]))
+
+    def inputs(self, position: Position) -> Array:
+        """Return what a policy sees [B, I]."""
+        return self.view.inputs(position.observations, self.line, position.progress)
+
+    def step(self, position: Position, controls: Array) -> FollowStep:
+        """Make one step with controls [B, A]."""
+        outcome = self.model.transition(position.states, controls)
+        observations = self.model.observe(outcome.states)
+        progress = position.progress.advanced(self.line, self.view.features(observations), self.view.window)
+        gains = ((progress.pointers - position.progress.pointers) * self.line.spacing).astype(np.float64)
+        return FollowStep(Position(outcome.states, observations, progress), gains, outcome.success,
+                          outcome.terminated, outcome.ended)
+
+    def execute(self, relay: Relay, places: IndexArray, *, epsilon: float, max_steps: int, patience: int,
+                rng: np.random.Generator, counter: Counter) -> Tries:
+        """Let policies act, in the model, until the goal, the end of the episode or of patience.
+
+        Args:
+            relay: The policies.
+            places: The numbers of the plan's states where executions begin [B].
+            epsilon: Fraction of random actions.
+            max_steps: Steps after which an execution has failed.
+            patience: Steps without progress after which it has.
+            rng: Source of random actions.
+            counter: Counts every transition.
+
+        Raises:
+            BudgetUsedUp: in the middle of the executions.
+        """
+        position = self.at(places)
+        success, pointers = np.zeros(len(places), dtype=np.bool_), position.progress.pointers.copy()
+        alive = np.arange(len(places))
+        for _ in range(max_steps):
+            controls = relay.act(self.inputs(position), position.progress.pointers)
+            controls = with_random_actions(self.model, controls, epsilon, rng)
+            counter.spend(len(alive))
+            after = self.step(position, controls)
+            pointers[alive], success[alive] = after.position.progress.pointers, after.success
+            over = after.success | after.ended | (after.position.progress.stalled >= patience)
+            going = np.flatnonzero(~over)
+            alive, position = alive[going], after.position[going]
+            if not len(alive):
+                break
+        return Tries(success, pointers)
+
+
+def feature_entries(model: ResettableModel, states: Array, observations: Array) -> IndexArray:
+    """Return the entries of the observation that are the feature, in its order [F].
+
+    Args:
+        model: It knows features.
+        states: [N, D].
+        observations: Those of the states [N, O].
+
+    Raises:
+        Mismatch: a dimension of the feature is no entry of the observation.
+    """
+    entries = []
+    for dimension, values in enumerate(model.feature(states).T):
+        errors = np.abs(observations - values[:, None]).max(axis=0)
+        closest = int(errors.argmin())
+        if errors[closest] > TOLERANCE * max(1.0, float(np.abs(values).max())):
+            raise Mismatch(f"{model.spec.id}: dimension {dimension} of the feature is no entry of the observation, so "
+                           "a controller of observations cannot know where it is on the line; explore entries of the "
+                           f"observation (--feature 'obs[0:{observations.shape[1]}]'), or use another method than "
+                           "follow")
+        entries.append(closest)
+    return np.array(entries, dtype=np.int64)
