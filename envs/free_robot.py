@@ -24,7 +24,7 @@ class FreeRobot:
     def heading(self, observations: Array) -> Array:
         """Return the yaw [B] of the root."""
         w, x, y, z = observations[:, 3:7].T
-        yaw: Array = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        yaw: Array = np.arctan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)  # resets give no unit quaternions
         return yaw
 
     def turned(self, observations: Array, angles: Array) -> Array:
