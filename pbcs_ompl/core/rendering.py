@@ -3,6 +3,7 @@
 import ctypes.util
 import os
 import sys
+from functools import cache
 
 from pbcs_ompl.core.errors import MissingDependency
 
@@ -17,14 +18,20 @@ def prefer_headless_rendering() -> None:
     """
     if "mujoco" in sys.modules:
         return
-    if sys.platform == "linux" and not os.environ.get("DISPLAY") and ctypes.util.find_library("EGL"):
+    if sys.platform == "linux" and not os.environ.get("DISPLAY") and _library("EGL"):
         os.environ.setdefault("MUJOCO_GL", "egl")
 
 
 def renderer_is_missing() -> bool:
     """Return whether MUJOCO_GL names a library that is not there: MuJoCo then fails when it is imported."""
     library = LIBRARIES.get(os.environ.get("MUJOCO_GL", "").lower())
-    return library is not None and ctypes.util.find_library(library) is None
+    return library is not None and _library(library) is None
+
+
+@cache
+def _library(name: str) -> str | None:
+    """Return the file of a shared library, None where it is not installed; Linux starts a program to find out."""
+    return ctypes.util.find_library(name)
 
 
 def check_can_render() -> None:
