@@ -134,6 +134,7 @@ def _plan(verb: Parser) -> None:
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop after this much wall time")
     verb.add_argument("--video", metavar="FILE", help="film the path that was found; .mp4 or .gif")
     _add_out(verb)
+    verb.add_argument("--no-pictures", action="store_true", help="write no tree.png, which takes half a second")
 
 
 def _train(verb: Parser) -> None:
