@@ -141,7 +141,7 @@ def _train(verb: Parser) -> None:
     """plan a trajectory, then train a chain of skills along it"""
     _add_environment(verb, required=False)
     verb.add_argument("--method", default="pbcs", metavar="NAME",
-                      help="pbcs, pb, backplay, plain, bootstrapped or offline (pbcs)")
+                      help="pbcs, follow, pb, backplay, plain, bootstrapped or offline (pbcs)")
     _add_planner(verb)
     verb.set_defaults(planner=None)  # Ex, or none beside --path
     verb.add_argument("--agent", default="ddpg", metavar="NAME", help="registered, or module:Class (ddpg)")

@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 
-from pbcs_ompl.core.errors import Mismatch
+from pbcs_ompl.core.errors import InvalidState, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
 from pbcs_ompl.skills.episodes import with_random_actions
@@ -116,7 +116,12 @@ class FollowTask:
 
         Raises:
             Mismatch: the observation does not show the feature.
+            InvalidState: the plan is in the goal before its end.
         """
+        early = np.flatnonzero(model.goal_distance(states[:-1]) < model.goal_threshold)
+        if len(early):
+            raise InvalidState(f"state {early[0]} of the plan is in the goal, where the episode ends, but the plan has "
+                               f"{len(states) - 1} steps; cut it off there")
         observations = model.observe(states)
         entries = feature_entries(model, states, observations)
         features = observations[:, entries]

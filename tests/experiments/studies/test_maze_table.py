@@ -17,10 +17,12 @@ def record(label, size, index, solved, *, cost=100_000, skills=1):
             "success_rate": float(solved), "nominal_success_rate": float(solved)}
 
 
-def table(pbcs, pb, ddpg, td3, **options):
+def table(pbcs, pb, ddpg, td3, *, follow=lambda *_: True, follow_cost=30_000, **options):
     """Records of ten seeds a size; each method is a function of size and index that says whether it is solved."""
     methods = {"PBCS": pbcs, "PB": pb, "DDPG": ddpg, "TD3": td3}
-    return [record(label, size, index, solves(size, index), skills=size, **options)
+    followed = [record("Follow", size, index, follow(size, index), cost=follow_cost)
+                for size in SIZES for index in range(10)]
+    return followed + [record(label, size, index, solves(size, index), skills=size, **options)
             for label, solves in methods.items() for size in SIZES for index in range(10)]
 
 
@@ -40,7 +42,7 @@ def test_a_world_as_the_thesis_describes_it(verdicts):
     records = table(lambda size, _: True, lambda size, index: size == 2 and index < 9,
                     lambda size, index: size == 2 and index < 1, lambda size, index: size == 2 and index < 1)
     claims = verdicts(records)
-    assert len(claims) == 13
+    assert len(claims) == 15
     assert {text: claim.agrees for text, claim in claims.items()} == dict.fromkeys(claims, True)
     compared = find(claims, "PBCS solves more mazes than PB (").numbers
     assert compared["only PBCS, only PB"] == [61, 0]
@@ -48,7 +50,7 @@ def test_a_world_as_the_thesis_describes_it(verdicts):
 
 def test_the_opposite_world(verdicts):
     records = table(lambda size, index: size < 4 and index < 9, lambda size, _: True, lambda size, _: size > 2,
-                    lambda size, _: size > 2)
+                    lambda size, _: size > 2, follow=lambda size, index: size < 4 and index < 8, follow_cost=50_000)
     claims = verdicts(records)
     unlike = {"PB solves 2x2 mazes much more often", "PBCS chains more skills"}
     for text, claim in claims.items():
@@ -75,11 +77,11 @@ def test_four_runs_without_success_do_not_show_that_there_is_none(verdicts):
 def test_pbcs_runs_first_and_then_the_others_in_balance():
     settings = STUDY.runs(STUDY.sweep, 20)
     labels = [one["label"] for one in settings]
-    assert len(settings) == 100 + 20 + 7 * (10 + 10 + 3)
+    assert len(settings) == 2 * (100 + 20) + 7 * (10 + 10 + 3)
     assert set(labels[:120]) == {"PBCS"}
-    assert [(one["label"], one["size"]) for one in settings[120:141]] == [
-        (label, size) for size in SIZES for label in ("PB", "DDPG", "TD3")]
-    assert {one["seed"] for one in settings[120:141]} == {500}
+    assert [(one["label"], one["size"]) for one in settings[120:148]] == [
+        (label, size) for size in SIZES for label in ("Follow", "PB", "DDPG", "TD3")]
+    assert {one["seed"] for one in settings[120:148]} == {500}
 
 
 @pytest.mark.parametrize("label", ["PBCS", "TD3"])

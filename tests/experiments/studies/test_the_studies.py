@@ -36,7 +36,7 @@ SMALL = {
     "backplay-2x2": {"max_transitions": 3000, "alone": {"steps": 200, "discount": 0.9}},
     "maze-table": {
         "methods": {label: {"method": method, "agent": "ddpg", "max_transitions": 3000, "seeds": 1}
-                    for label, method in {"PBCS": "pbcs", "PB": "pb", "DDPG": "plain"}.items()},
+                    for label, method in {"PBCS": "pbcs", "Follow": "follow", "PB": "pb", "DDPG": "plain"}.items()},
         "sizes": {"2": {"episode_steps": 20, "seeds": 1}}},
     "pbcs-ablation": {"sizes": [2], "max_transitions": 3000,
                       "values": {"alpha": [1, 3], "beta": [5, 50], "radius": [0.1, 0.2]}},

@@ -16,6 +16,7 @@ from pbcs_ompl.resettable import make
 
 Records = list[dict[str, Any]]
 ALONE = ("DDPG", "TD3")
+THIRD = 1 / 3
 BARS = (((2, 3, 4, 5, 7), 0.95, "[Matheron2020] 7.4: PBCS solves mazes up to 7x7; the bar is ours"),
         ((10, 15), 0.8, "ours: beyond [Matheron2020]"))
 MILLION = 1_000_000
@@ -31,7 +32,8 @@ def analyse(records: Records, figures: Path) -> list[Claim]:
     for record in _of(records, "PBCS"):
         if "rollout" in record:
             _draw_chain(record, figures)
-    return [*_bars(records), *_alone(records), *_backplay(records), *_compared(records), _skills(records)]
+    return [*_bars(records), *_alone(records), *_backplay(records), *_compared(records), _skills(records),
+            *_followed(records)]
 
 
 def _sizes(records: Records) -> list[int]:
@@ -129,6 +131,22 @@ def _compared(records: Records) -> list[Claim]:
                              f"only PBCS, only {label}": [ours, theirs], "p (McNemar, exact)": float(chance)},
                             "[Matheron2020] 7.4"))
     return claims
+
+
+def _followed(records: Records) -> list[Claim]:
+    """Compare path following with PBCS where both have run."""
+    pbcs = {(r["size"], r["seed"]): r for r in _of(records, "PBCS")}
+    pairs = [(pbcs[r["size"], r["seed"]], r) for r in _of(records, "Follow") if (r["size"], r["seed"]) in pbcs]
+    theirs, ours = (sum(pair[k]["solved"] for pair in pairs) for k in (0, 1))
+    enough = len(pairs) >= FEWEST_PAIRS
+    ratios = {f"{size}x{size}": [one["transitions"] / other["transitions"] for other, one in pairs
+                                 if one["size"] == size and one["solved"] and other["solved"]]
+              for size in _sizes([one for _, one in pairs])}
+    medians = {size: float(np.median(values)) for size, values in ratios.items() if values}
+    return [Claim("path following solves no fewer mazes than PBCS", ours >= theirs if enough else None,
+                  {"Follow": rate(ours, len(pairs)), "PBCS": rate(theirs, len(pairs))}, "ours"),
+            Claim("path following takes at most a third of PBCS's transitions in each size (median of the ratios)",
+                  max(medians.values()) <= THIRD if enough and medians else None, {"ratio, median": medians}, "ours")]
 
 
 def _skills(records: Records) -> Claim:

@@ -25,7 +25,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     """Train once; record what it cost and whether the policy succeeds."""
     size, seed = settings["size"], settings["seed"]
     kwargs = {"size": size, "wall_penalty": settings["wall_penalty"]} | ({"maze_seed": seed} if size > 3 else {})
-    changes = {} if settings["method"] == "pbcs" else {"max_steps": settings["episode_steps"]}
+    changes = {} if settings["method"] in ("pbcs", "follow") else {"max_steps": settings["episode_steps"]}
     record, result = trained("pbcs/Maze-v0", kwargs, settings=changes, seed=seed,
                              **{key: settings[key] for key in ("method", "agent", "preset", "max_transitions")})
     if settings["index"] == PICTURED_INDEX and result.chain is not None:

@@ -1,0 +1,226 @@
+"""Path following: it solves a maze, resumes bit for bit, splits where a policy fails, and refuses what it cannot do."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbcs_ompl
+from pbcs_ompl.bridge.trajectory import Trajectory
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, InvalidState, Mismatch
+from pbcs_ompl.core.types import Counter
+from pbcs_ompl.resettable import make
+from pbcs_ompl.skills import load_chain, method_settings
+from pbcs_ompl.skills.agent_interface import load_agent
+from pbcs_ompl.skills.follow import Follow, FollowSettings, Verdict
+from pbcs_ompl.skills.follow_chain import FollowChain
+from pbcs_ompl.skills.follow_task import FollowTask, LineSettings
+from pbcs_ompl.skills.method import Snapshot
+from pbcs_ompl.skills.trainer import SkillTrainer
+from pbcs_ompl.skills.waypoints import Waypoints
+
+MAZE: dict[str, Any] = {"size": 2}
+MODEL = make("pbcs/Maze-v0", MAZE)
+
+
+@pytest.fixture(scope="module")
+def plan() -> Trajectory:
+    found = pbcs_ompl.plan("pbcs/Maze-v0", env_kwargs=MAZE, seed=0).trajectory
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("follow") / "run"
+    result = pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=MAZE, method="follow", seed=0, out=out)
+    assert result.solved, result.reason
+    assert result.chain is not None
+    assert result.chain.num_policies == result.summary()["skills"] >= 1
+    return out
+
+
+def method(states: np.ndarray, settings: FollowSettings | None = None, budget: int = 100_000) -> Follow:
+    chosen = settings or method_settings("follow")
+    assert isinstance(chosen, FollowSettings)
+    kind, spaces = load_agent("ddpg"), chosen.agent_spaces(MODEL)
+    trainer = SkillTrainer(lambda seed: kind(*spaces, settings=kind.settings_type.from_preset("fast"), seeds=(seed,),
+                                             device="cpu"),
+                           Waypoints.of_plan(states, MODEL, chosen), chosen.episodes, Counter(budget),
+                           np.random.default_rng(0))
+    return Follow(trainer, chosen)
+
+
+def test_a_saved_follower_acts_as_the_one_that_was_saved(folder: Path, tmp_path: Path) -> None:
+    loaded = load_chain(folder / "chain")
+    assert isinstance(loaded, FollowChain)
+    loaded.save(tmp_path / "again")
+    for chain in (loaded, FollowChain.load(tmp_path / "again")):
+        found = pbcs_ompl.evaluate(chain, episodes=20, epsilon=0.1)
+        assert found.success_rate >= 0.9
+    np.testing.assert_array_equal(loaded.rollout(MODEL), FollowChain.load(tmp_path / "again").rollout(MODEL))
+
+
+def test_a_changed_follower_is_found_and_one_method_reads_not_the_other(folder: Path, tmp_path: Path) -> None:
+    load_chain(folder / "chain").save(tmp_path)
+    with pytest.raises(DamagedFile, match=r"that of a follower, not of a skill chain; read it with .*load_chain"):
+        pbcs_ompl.SkillChain.load(tmp_path)
+    arrays = (tmp_path / "chain.npz").read_bytes()
+    (tmp_path / "chain.npz").write_bytes(arrays[:-1] + bytes([arrays[-1] ^ 1]))
+    with pytest.raises(DamagedFile, match="SHA-256"):
+        load_chain(tmp_path)
+
+
+def test_resuming_gives_the_same_bits(plan: Trajectory) -> None:
+    strict = FollowSettings().updated({"attempts": 2, "session_lengths": 1, "refused_rate": 0.999,
+                                       "accepted_rate": 0.9999})  # no policy passes
+    whole, first, second = (method(plan.states, strict) for _ in range(3))
+    for _ in range(5):
+        whole.step()
+        first.step()
+    before = first.snapshot()
+    second.restore(Snapshot(before.plain, {name: array.copy() for name, array in before.arrays.items()}))
+    for _ in range(4):
+        whole.step()
+        second.step()
+    one, two = whole.snapshot(), second.snapshot()
+    assert one.plain == two.plain
+    assert one.arrays.keys() == two.arrays.keys()
+    for name, array in one.arrays.items():
+        np.testing.assert_array_equal(array, two.arrays[name], err_msg=name)
+
+
+def test_the_budget_binds_and_a_larger_one_continues(tmp_path: Path) -> None:
+    planned = pbcs_ompl.plan("pbcs/Maze-v0", env_kwargs=MAZE, seed=0).trajectory
+    short = pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=planned, method="follow", seed=0,
+                            max_transitions=700, out=tmp_path / "run")
+    assert (short.complete, short.solved) == (False, False)
+    assert short.train_transitions <= 700
+    assert "of the line" in str(short.reason)
+    assert short.chain is not None
+    longer = pbcs_ompl.skills.resume(tmp_path / "run", max_transitions=200_000)
+    whole = pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=planned, method="follow", seed=0,
+                            max_transitions=200_000)
+    assert longer.solved
+    assert longer.updates == whole.updates
+    assert longer.chain is not None
+    assert whole.chain is not None
+    np.testing.assert_array_equal(longer.chain.rollout(MODEL), whole.chain.rollout(MODEL))
+
+
+def test_after_its_attempts_the_best_policy_is_kept_from_where_it_passes(plan: Trajectory,
+                                                                         monkeypatch: pytest.MonkeyPatch) -> None:
+    following = method(plan.states, FollowSettings().updated({"attempts": 2, "session_lengths": 1}))
+    passes_from = following.task.line.last // 2
+    tried: list[int] = []
+
+    def verdict(self: Follow, policy: Any, first: int) -> Verdict:
+        tried.append(first)
+        return Verdict(first >= passes_from, 0.5, first + 10)
+
+    monkeypatch.setattr(Follow, "_try", verdict)
+    while not following.members:
+        following.step()
+    assert tried[:2] == [0, 0]
+    assert tried[2:] == sorted(set(tried[2:]))
+    assert following.members[0].first == tried[-1] == following.state.end
+    assert tried[-2] < passes_from <= tried[-1]
+    assert 0 < following.covered < 1
+    assert (following.task.pointers[following.task.place(following.state.end)] >= following.state.end)
+    restored = method(plan.states)
+    restored.restore(following.snapshot())
+    assert [member.first for member in restored.members] == [following.state.end]
+    monkeypatch.setattr(Follow, "_try", lambda self, policy, first: Verdict(True, 1.0, 0))
+    while not following.done:
+        following.step()
+    chain = following.chain(100)
+    assert chain.firsts == (0, following.members[1].first)
+    assert (following.covered, chain.num_policies) == (1.0, 2)
+
+
+def test_a_policy_that_passes_nowhere_begins_again(plan: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    following = method(plan.states, FollowSettings().updated({"attempts": 1, "session_lengths": 1}))
+    last = following.task.line.last
+    monkeypatch.setattr(Follow, "_try", lambda self, policy, first: Verdict(False, 0.0, last))
+    agent = following.trainer.agent
+    for _ in range(3):
+        following.step()
+    assert following.trainer.agent is not agent
+    assert (following.members, following.state.end, following.state.tests) == ([], last + 1, 0)
+
+
+def test_starts_lie_all_along_the_plan_before_the_end(plan: Trajectory) -> None:
+    following = method(plan.states)
+    following.state.end = following.task.line.last // 2
+    begun = following._fresh(500)
+    assert begun.progress.pointers.max() < following.state.end
+    assert len(np.unique(begun.progress.pointers)) > 5
+    first = (begun.states == plan.states[0]).all(axis=1).mean()
+    assert 0.05 < first < 0.4
+
+
+def test_the_line_is_in_steps_of_the_plan_and_policies_see_it_in_the_observation(plan: Trajectory) -> None:
+    task = FollowTask.of(MODEL, plan.states, LineSettings())
+    np.testing.assert_allclose(task.line.points[0] * task.view.unit, plan.states[0])
+    np.testing.assert_allclose(task.line.points[-1] * task.view.unit, plan.states[-1])
+    assert (np.diff(task.pointers) >= 0).all()
+    assert task.hops < plan.length
+    position = task.at(np.arange(plan.length))
+    seen = task.inputs(position)
+    assert np.abs(seen[:, :2].mean(axis=0)).max() < 0.2
+    assert seen.shape == (plan.length, task.view.size)
+    assert task.view.size == FollowSettings().agent_spaces(MODEL).observation_size
+    tail = task.line.ahead(task.view.features(position.observations), np.full(plan.length, task.line.last),
+                           task.view.distances)
+    np.testing.assert_array_equal(tail[:, 0], tail[:, 2])
+
+
+def test_a_feature_that_is_not_observed_is_refused() -> None:
+    pendulum = make("Pendulum-v1")
+    states = [pendulum.initial_state(0)[None]]
+    for _ in range(5):
+        states.append(pendulum.transition(states[-1], pendulum.action_high[None]).states)
+    with pytest.raises(Mismatch, match=r"Pendulum-v1: dimension 0 of the feature is no entry of the observation.*"
+                                       r"--feature 'obs\[0:3\]'"):
+        FollowTask.of(pendulum, np.concatenate(states), LineSettings())
+
+
+def test_a_plan_through_a_terminal_state_is_refused(plan: Trajectory) -> None:
+    """The goal ends episodes, so a plan that passes through it has steps that no episode has."""
+    back = MODEL.transition(plan.states[-1:], -plan.controls[-1:])
+    longer = replace(plan, states=np.concatenate([plan.states, back.states]), rewards=np.append(plan.rewards, 0.0),
+                     actions=np.concatenate([plan.actions, -plan.actions[-1:]]))
+    with pytest.raises(InvalidState, match=f"state {plan.length} of the plan is in the goal.*cut it off there"):
+        pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=longer, method="follow", seed=0)
+
+
+def test_a_start_in_the_goal_needs_no_policy() -> None:
+    result = pbcs_ompl.train("pbcs/Maze-v0", env_kwargs={"size": 2, "start": [0.5, 1.5]}, method="follow", seed=0)
+    assert (result.solved, result.chain, result.train_transitions) == (True, None, 0)
+
+
+def test_a_checkpoint_of_another_method_is_refused(plan: Trajectory, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=plan, method="pb", seed=0, max_transitions=3_000,
+                    out=out)
+    config = out / "config.toml"
+    config.write_text(config.read_text().replace('method = "pb"', 'method = "follow"'))
+    with pytest.raises(DamagedFile):
+        pbcs_ompl.skills.resume(out, max_transitions=10_000)
+
+
+@pytest.mark.parametrize("changes", [{"spacing": 0.0}, {"look_ahead": -1.0}, {"window": 0.0}, {"patience": 0},
+                                     {"attempts": 0}, {"action_noise": -0.1}, {"start_fraction": 1.5}])
+def test_settings_out_of_range_are_refused(changes: dict[str, Any]) -> None:
+    with pytest.raises(InvalidOption, match=next(iter(changes))):
+        method_settings("follow", changes=changes)
+
+
+def test_other_agents_follow_too() -> None:
+    result = pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=MAZE, method="follow", agent="td3", seed=0,
+                             max_transitions=4_000)
+    assert result.updates > 0
+    assert result.chain is not None
+    assert result.chain.num_policies >= 1
