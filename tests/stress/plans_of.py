@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pbcs_ompl
 
-
 PLANNERS = ("Ex", "RRTNH", "KPIECE1", "RRT")
 
 
