@@ -1,7 +1,6 @@
 """What code of others may return or raise: finite states, and exceptions that become one named error."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +22,10 @@ def callback_failed(error: BaseException, source: str = "the environment, goal o
     return CallbackFailed(f"{source} raised {describe(error)}")
 
 
-@contextmanager
-def code_of_others(source: str = "the environment, goal or planner") -> Iterator[None]:
+class code_of_others:
     """Turn whatever the code of others raises, `sys.exit` too, into one named error; our own errors and Ctrl-C pass.
+
+    A context, and a class because it is entered for every step of an execution.
 
     Args:
         source: Whose code it is, as in "the environment 'Reacher-v5'".
@@ -33,12 +33,17 @@ def code_of_others(source: str = "the environment, goal or planner") -> Iterator
     Raises:
         CallbackFailed: names the exception, which is chained.
     """
-    try:
-        yield
-    except PbcsError:
-        raise
-    except (Exception, SystemExit) as error:
-        raise callback_failed(error, source) from error
+
+    def __init__(self, source: str = "the environment, goal or planner"):
+        self._source = source
+
+    def __enter__(self) -> None:
+        """Begin."""
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
+        """Pass on our own errors, and turn those of others into one."""
+        if isinstance(error, Exception | SystemExit) and not isinstance(error, PbcsError):
+            raise callback_failed(error, self._source) from error
 
 
 def check_finite(before: Array, controls: Array, after: Array) -> None:
