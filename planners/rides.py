@@ -80,7 +80,7 @@ class Rides(Strategy):
         return self.context.parallel_batch
 
     def select(self, tree: Tree, count: int) -> IndexArray:
-        """Return where the first `count` rides are; those that had ended begin anew."""
+        """Return where the first `count` rides are; those that had ended begin again."""
         self._add_rides(count)
         rides_loop.begin(self.regions, self._yields, self._bounds, self._rides, self._actions, count, self.rng)
         self._riding = count
@@ -91,13 +91,13 @@ class Rides(Strategy):
         return self._actions[:len(nodes)].copy()
 
     def durations(self, tree: Tree, nodes: IndexArray) -> IndexArray:
-        """Return the least number of steps [B]: whether a control goes on is decided after each."""
+        """Return the least number of steps [B]: whether a control lasts longer is decided after each."""
         return np.full(len(nodes), self.context.control_durations[0])
 
     def inserted(self, tree: Tree, first: int, last: int) -> None:
         """Put the new nodes into their bins, and end the rides that are over."""
         self.regions = reserve(self.regions, last - first)
-        rides_loop.arrive(self.regions, self._yields, self._rides, self._riding, tree.columns, first, last, self._size,
+        rides_loop.note(self.regions, self._yields, self._rides, self._riding, tree.columns, first, last, self._size,
                           self.context.episode_steps)
 
     def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:

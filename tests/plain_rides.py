@@ -37,7 +37,7 @@ class Ranking:
 
 
 class PlainRides:
-    """One ride after the other: `next_step` says where to apply which control, `arrived` takes what came of it."""
+    """One ride after the other: `next_step` says where to apply which control, `take_step` takes the result."""
 
     def __init__(self, features, bin_size, low, high, rng, longest, scales=5):
         self.features, self.bin_size, self.low, self.high, self.rng = features, bin_size, low, high, rng
@@ -119,7 +119,7 @@ class PlainRides:
     def root(self, node, feature):
         self.bin_of(feature)[0].nodes.append(node)
 
-    def arrived(self, node, feature, moved, terminal):
+    def take_step(self, node, feature, moved, terminal):
         self.steps += 1
         over = terminal
         if not terminal:

@@ -10,7 +10,7 @@ from numba.extending import intrinsic
 
 @intrinsic
 def uncounted(typing_context: Any, value: Any) -> Any:
-    """Return the same array, or tuple with arrays, as one that nobody owns; it must not outlive what it is made from.
+    """Return the same array, or tuple with arrays, as one without an owner; it must not outlive what it is made from.
 
     Numba counts references where it hands arrays from one function to another. In a loop that calls a few, these atomic
     operations take most of the time.

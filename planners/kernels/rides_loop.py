@@ -111,7 +111,7 @@ def _end(yields: Array, rides: IndexArray, ride: int) -> None:
 
 
 @njit(inline="always")
-def _arrive(rides: IndexArray, ride: int, yields: Array, states: Array, node: Number, number: Number, opened: bool,
+def _note(rides: IndexArray, ride: int, yields: Array, states: Array, node: Number, number: Number, opened: bool,
             terminal: bool, longest: int) -> None:
     """Take note that a ride has come to a node, in bin `number` unless it is terminal; end the ride where it ends."""
     rides[ride, STEPS] += 1
@@ -147,7 +147,7 @@ def begin(regions: Regions, yields: Array, bounds: Array, rides: IndexArray, act
 
 
 @njit(error_model="numpy")
-def arrive(regions: Regions, yields: Array, rides: IndexArray, count: int, columns: Columns, first: int, last: int,
+def note(regions: Regions, yields: Array, rides: IndexArray, count: int, columns: Columns, first: int, last: int,
            bin_size: Array, longest: int) -> None:
     """Take note of the nodes first, ..., last - 1: roots, or what followed from the first `count` rides, in order.
 
@@ -170,7 +170,7 @@ def arrive(regions: Regions, yields: Array, rides: IndexArray, count: int, colum
         while rides[ride, NODE] != parents[node]:
             _end(yields, rides, ride)
             ride += 1
-        _arrive(rides, ride, yields, states, node, number, opened, ends[node], longest)
+        _note(rides, ride, yields, states, node, number, opened, ends[node], longest)
         ride += 1
     if last > first and parents[first] >= 0:
         for silent in range(ride, count):
@@ -194,7 +194,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
         regions, bin_size: The regions, with space for `most` more nodes, and the edges of the bins [F].
         longest: The most steps of a ride.
         yields: Bins opened and steps used so far, and the weight [3, answers, 3], by scale, kind and patience.
-        rides, actions: The first row of each is the ride that goes on, and its control.
+        rides, actions: The first row of each is the ride in progress, and its control.
         rng: The random numbers.
 
     Returns:
@@ -226,7 +226,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
             if number < 0:
                 number, opened = open_bin(regions, cell), True
             add_node(rows, pool, free, used, number, child)
-        _arrive(rides, 0, yields, states, child, number, opened, terminal, longest)
+        _note(rides, 0, yields, states, child, number, opened, terminal, longest)
         if success:
             return child + 1 - first, True
     return most, False

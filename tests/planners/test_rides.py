@@ -29,7 +29,7 @@ def plain(model, seed, budget, **options):
         states.append(result.states[0])
         parents.append(node)
         controls.append(control)
-        rule.arrived(new, states[new], (states[new] != states[node]).any(), result.terminated[0])
+        rule.take_step(new, states[new], (states[new] != states[node]).any(), result.terminated[0])
         if result.success[0]:
             break
     return np.array(states), np.array(parents), np.array(controls)

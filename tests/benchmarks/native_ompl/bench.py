@@ -141,7 +141,7 @@ def run_all(size: int, seeds: range, native: Native, folder: Path) -> dict[str, 
 
 
 def sign_test(fewer: int, more: int) -> float:
-    """Return the two-sided p of so many fewer and more."""
+    """Return the two-sided p of these numbers of pairs."""
     total, extreme = fewer + more, max(fewer, more)
     tail = sum(math.comb(total, k) for k in range(extreme, total + 1)) / 2**total
     return min(1.0, 2 * tail)
