@@ -16,7 +16,7 @@ from pbcs_ompl.skills import load_chain, method_settings
 from pbcs_ompl.skills.agent_interface import load_agent
 from pbcs_ompl.skills.follow import Follow, FollowSettings, Verdict
 from pbcs_ompl.skills.follow_chain import FollowChain
-from pbcs_ompl.skills.follow_task import FollowTask, LineSettings
+from pbcs_ompl.skills.follow_task import FollowTask, LineSettings, extended
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
@@ -164,7 +164,9 @@ def test_starts_lie_all_along_the_plan_before_the_end(plan: Trajectory) -> None:
 def test_the_line_is_in_steps_of_the_plan_and_policies_see_it_in_the_observation(plan: Trajectory) -> None:
     task = FollowTask.of(MODEL, plan.states, LineSettings())
     np.testing.assert_allclose(task.line.points[0] * task.view.unit, plan.states[0])
-    np.testing.assert_allclose(task.line.points[-1] * task.view.unit, plan.states[-1])
+    end = task.line.points[task.pointers[-1]]
+    np.testing.assert_allclose(end * task.view.unit, plan.states[-1], atol=0.5 * task.line.spacing * 0.1)
+    assert (task.line.last - task.pointers[-1]) * task.line.spacing == pytest.approx(4.0, abs=0.5)
     assert (np.diff(task.pointers) >= 0).all()
     assert task.hops < plan.length
     position = task.at(np.arange(plan.length))
@@ -175,6 +177,13 @@ def test_the_line_is_in_steps_of_the_plan_and_policies_see_it_in_the_observation
     tail = task.line.ahead(task.view.features(position.observations), np.full(plan.length, task.line.last),
                            task.view.distances)
     np.testing.assert_array_equal(tail[:, 0], tail[:, 2])
+
+
+def test_a_line_continues_in_the_direction_in_which_the_plan_ends() -> None:
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.5]])
+    np.testing.assert_allclose(extended(corners, 4.0), [*corners, [1.0, 4.5]])
+    still = np.zeros((2, 2))
+    np.testing.assert_array_equal(extended(still, 4.0), still)
 
 
 def test_a_feature_that_is_not_observed_is_refused() -> None:
