@@ -1,5 +1,6 @@
 """Path following: it solves a maze, resumes bit for bit, splits where a policy fails, and refuses what it cannot do."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import pytest
 
 import pbcs_ompl
 from pbcs_ompl.bridge.trajectory import Trajectory
+from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, InvalidState, Mismatch
 from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
@@ -61,6 +63,17 @@ def test_a_saved_follower_acts_as_the_one_that_was_saved(folder: Path, tmp_path:
         found = pbcs_ompl.evaluate(chain, episodes=20, epsilon=0.1)
         assert found.success_rate >= 0.9
     np.testing.assert_array_equal(loaded.rollout(MODEL), FollowChain.load(tmp_path / "again").rollout(MODEL))
+
+
+def test_the_commands_take_it_as_they_take_a_chain(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                   capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    train = ["train", "--method", "follow", "--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 2}', "--out", "run"]
+    assert main(train) == 0
+    assert (tmp_path / "run" / "chain.png").stat().st_size > 5000
+    assert main(["eval", "run", "--epsilon", "0.1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.strip().splitlines()[-1])["success_rate"] > 0.9
+    assert main(["report", "run"]) == 0
 
 
 def test_a_changed_follower_is_found_and_one_method_reads_not_the_other(folder: Path, tmp_path: Path) -> None:
