@@ -13,6 +13,7 @@ from pbcs_ompl.core.batches import check_batch
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray, Transition
 from pbcs_ompl.envs import point_kernels
+from pbcs_ompl.envs.point_robot import PointRobot
 from pbcs_ompl.envs.rendering import rasterise
 
 MAX_STEP = 0.1
@@ -44,6 +45,7 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 30}  # type: ignore[misc]
     feature_dims = (0, 1)
+    robot = PointRobot()
     goal_threshold = GOAL_RADIUS
 
     def __init__(self, extent: float, start: Sequence[float], goal: Sequence[float] | None, *,

@@ -34,11 +34,9 @@ def build_wall_grid(rectangles: Array, extent: float, reach: float) -> WallGrid:
     cells = max(1, int(np.ceil(extent * CELLS_PER_UNIT)))
     spread = np.array([-1.0, -1.0, 1.0, 1.0]) * (reach + MARGIN)
     ranges = np.floor((rectangles + spread) * CELLS_PER_UNIT).astype(np.int64).clip(0, cells - 1)
-    near: list[list[int]] = [[] for _ in range(cells * cells)]
-    for wall, (i0, j0, i1, j1) in enumerate(ranges.tolist()):
-        for i in range(i0, i1 + 1):
-            for j in range(j0, j1 + 1):
-                near[i * cells + j].append(wall)
-    begins = np.cumsum([len(near) + 1, *map(len, near)])
-    lists = np.array([*begins, *(wall for walls in near for wall in walls)], dtype=np.int64)
-    return WallGrid(np.array(rectangles), lists, cells)
+    near = [(i * cells + j, wall) for wall, (i0, j0, i1, j1) in enumerate(ranges.tolist())
+            for i in range(i0, i1 + 1) for j in range(j0, j1 + 1)]
+    pairs = np.array(sorted(near), dtype=np.int64).reshape(-1, 2)
+    counts = np.bincount(pairs[:, 0], minlength=cells * cells)
+    begins = np.cumsum([cells * cells + 1, *counts])
+    return WallGrid(np.array(rectangles), np.concatenate([begins, pairs[:, 1]]), cells)

@@ -8,10 +8,10 @@ import numpy as np
 from pbcs_ompl.core.options import check_positive_numbers
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import IndexArray
+from pbcs_ompl.planners.context import PlanningContext
 from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert
 from pbcs_ompl.planners.kernels.sparse import draw_sparse
 from pbcs_ompl.planners.planner import Strategy
-from pbcs_ompl.planners.propagators import PlanningContext
 
 NODES_PER_BATCH = 100
 MOST_FEATURES = 4

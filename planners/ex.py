@@ -9,10 +9,10 @@ from pbcs_ompl.core.options import check_positive_numbers
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import IndexArray
 from pbcs_ompl.planners.compiled import CompiledStep
+from pbcs_ompl.planners.context import PlanningContext
 from pbcs_ompl.planners.kernels import ex_loop
-from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert, select, tied_bins
+from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert, reserve, select, tied_bins
 from pbcs_ompl.planners.planner import Strategy
-from pbcs_ompl.planners.propagators import PlanningContext
 
 
 class Ex(Strategy):
@@ -68,21 +68,14 @@ class Ex(Strategy):
         self.queue = insert(self.queue, tree.features[new], tree.terminal[new], self._size, first)
 
     def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:
-        """Expand up to `count` nodes one at a time in compiled code (see `pbcs_ompl.planners.compiled`)."""
+        """Expand nodes one at a time in compiled code (see `pbcs_ompl.planners.compiled`)."""
         bounds = np.array([self.context.action_low, self.context.action_high])
-        uniforms = self.rng.random((count, 2 + bounds.shape[1]))
+        durations = self.context.control_durations
+        drawn = durations[0] < durations[1]
+        uniforms = self.rng.random((max(1, count // durations[1]), 2 + bounds.shape[1] + drawn))
         tree.reserve(count)
-        done = 0
-        while done < count:
-            first = len(tree)
-            written, reason = ex_loop.expand(step.step, step[1:], feature_dims, bounds, tree.columns, first,
-                                             self.queue, self._size, uniforms[done:])
-            tree.claim(written)
-            done += written
-            if reason == ex_loop.NOT_FINITE:
-                break
-            if reason != ex_loop.DONE:
-                self.inserted(tree, len(tree) - 1, len(tree))
-            if reason == ex_loop.GOAL:
-                return len(tree) - 1
-        return -1
+        self.queue = reserve(self.queue, count)
+        written, reached = ex_loop.expand(step.parameters, feature_dims, bounds, durations, tree.columns,
+                                          len(tree), count, self.queue, self._size, uniforms)
+        tree.claim(written)
+        return len(tree) - 1 if reached else -1

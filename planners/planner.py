@@ -5,25 +5,30 @@ Each of the two classes knows the other: `Strategy.build` makes a TreePlanner, w
 
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 from ompl import base as ob
 
 from pbcs_ompl.core.callbacks import callback_failed, check_finite
+from pbcs_ompl.core.checked import short_repr
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, PbcsError
 from pbcs_ompl.core.interfaces import ResettableModel
-from pbcs_ompl.core.options import check_names, check_positive_integer
+from pbcs_ompl.core.options import check_control_duration, check_names, check_positive_integer
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Array, Counter, IndexArray
 from pbcs_ompl.planners.compiled import CompiledStep, CompiledStrategy
-from pbcs_ompl.planners.propagators import BatchPropagator, ModelPropagator, OmplPropagator, PlanningContext
+from pbcs_ompl.planners.context import PlanningContext
+from pbcs_ompl.planners.ompl_propagator import OmplPropagator
+from pbcs_ompl.planners.propagators import BatchPropagator, ModelPropagator
 
 ErrorType = TypeVar("ErrorType", bound=Exception)
 CHUNK = 2048
-"""Expansions of one compiled call, after which the termination condition is polled: about a millisecond."""
+"""Steps of one compiled call, after which the termination condition is polled: about a millisecond."""
+FIRST_CHUNK = 256
+"""Steps of the first call: strategies make space for what they are asked for."""
 PLANNER_OPTIONS = {"batch": "grow", "control_duration": 1}
 """The options, with their defaults, that every planner has beside those of its strategy."""
 
@@ -59,6 +64,13 @@ class Strategy(ABC):
         low, high = self.context.action_low, self.context.action_high
         return low + (high - low) * self.rng.random((len(nodes), len(low)))
 
+    def durations(self, tree: Tree, nodes: IndexArray) -> IndexArray:
+        """Return for how many steps [B] the controls from nodes [B] last; uniform in the bounds unless overridden."""
+        least, most = self.context.control_durations
+        if least == most:
+            return np.full(len(nodes), least)
+        return least + (self.rng.random(len(nodes)) * (most - least + 1)).astype(np.int64)
+
     def inserted(self, tree: Tree, first: int, last: int) -> None:  # noqa: B027 - optional
         """Note the new nodes first, ..., last - 1: all of them roots, or none; some may be terminal."""
 
@@ -75,25 +87,25 @@ class Strategy(ABC):
         return {**own, **PLANNER_OPTIONS}
 
     @classmethod
-    def build(cls, si: Any, *, seed: int = 0, batch: int | str = "grow", control_duration: int = 1,
-              **options: Any) -> "TreePlanner":
+    def build(cls, si: Any, *, seed: int = 0, **options: Any) -> "TreePlanner":
         """Return an OMPL planner with this strategy.
 
         Args:
             si: The `ompl.control.SpaceInformation` of any problem.
-            seed, batch, control_duration: See TreePlanner.
-            options: The arguments of `__init__`.
+            seed: See TreePlanner.
+            options: The arguments of `__init__`, and those of TreePlanner that `options` names.
 
         Raises:
             InvalidOption: `__init__` knows no such option, or refuses its value.
         """
         check_names(f"planner {cls.__name__!r}", "option", options, cls.options())
+        given = {**cls.options(), **options}
+        of_planner = {name: options.pop(name) for name in PLANNER_OPTIONS if name in options}
         try:
             strategy = cls(**options)
         except (TypeError, ValueError) as error:
             raise InvalidOption(f"planner {cls.__name__!r} refused the options {options}: {error}") from error
-        return TreePlanner(si, strategy, seed=seed, batch=batch, control_duration=control_duration,
-                           options={**cls.options(), **options})
+        return TreePlanner(si, strategy, seed=seed, **of_planner, options=given)
 
 
 class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no types
@@ -102,7 +114,7 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
     It works on any `ompl.control.SpaceInformation`. After `use_model` it propagates through the environment itself,
     many nodes at a time. Only exact solutions are reported. Exceptions never cross OMPL: `solve` keeps the first in
     `error` and returns ABORT. A second `solve` continues with the same tree and adds start states that are new in the
-    problem; `clear` drops the tree and continues with the same random numbers.
+    problem, but drops the tree for another problem. `clear` drops the tree and continues with the same random numbers.
 
     `getPlannerData` gives OMPL no nodes, because the installed OMPL aborts when Python overrides it; use `tree` or
     `planner_data`.
@@ -112,28 +124,30 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
         strategy: Which nodes to expand. It belongs to this planner, whose name is that of its class.
         seed: Equal seeds give equal trees.
         batch: How many nodes are selected before any of them is expanded; "grow" leaves it to the strategy.
-        control_duration: The most steps that a control lasts; each lasts 1 to this many steps, all durations equally
-            likely, and every step is a node. In [Matheron2020] it is 1. Longer ones are not made in compiled loops.
+        control_duration: The most steps that a control lasts, or the least and the most; all durations are equally
+            likely, and every step is a node. In [Matheron2020] it is 1. In an OMPL problem without an environment, 1
+            stands for the bounds of the problem.
         options: The strategy's options, reported in `settings`.
 
     Raises:
-        InvalidOption: `batch` is neither "grow" nor a positive integer, or `control_duration` is not one.
+        InvalidOption: `batch` is neither "grow" nor a positive integer, or `control_duration` no such numbers.
     """
 
     def __init__(self, si: Any, strategy: Strategy, *, seed: int = 0, batch: int | str = "grow",
-                 control_duration: int = 1, options: Mapping[str, Any] | None = None):
+                 control_duration: int | Sequence[int] = 1, options: Mapping[str, Any] | None = None):
         super().__init__(si, type(strategy).__name__)
         self._batch = None if batch == "grow" else check_positive_integer("batch", batch)
-        self._control_duration = check_positive_integer("control_duration", control_duration)
+        self._durations = check_control_duration(control_duration)
         self._strategy = strategy
-        self._options = {**(options or {}), "batch": batch, "control_duration": control_duration}
+        self._options = dict(options or {"batch": batch, "control_duration": control_duration})
         self._compiled: CompiledStrategy | None = None
-        if self._batch in (None, 1) and self._control_duration == 1 and isinstance(strategy, CompiledStrategy):
+        if self._batch in (None, 1) and isinstance(strategy, CompiledStrategy):
             self._compiled = strategy
         self._seeds = SeedTree(seed)
         self._rng = self._seeds.child("strategy").generator()
         self._propagator: BatchPropagator | None = None
         self._tree: Tree | None = None
+        self._problem: Any = None
         self._error: PbcsError | None = None
 
     @property
@@ -172,13 +186,13 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
 
     def use_model(self, model: ResettableModel, counter: Counter) -> None:
         """Propagate through `model` from now on, and count every transition in `counter`; drops the tree."""
-        self._propagator = ModelPropagator(self.getSpaceInformation(), model, counter)
+        self._propagator = ModelPropagator(self.getSpaceInformation(), model, counter, self._durations)
         self._tree = None
 
     def clear(self) -> None:
         """Drop the tree."""
         super().clear()
-        self._tree = None
+        self._tree = self._problem = None
         self._error = None
 
     def solve(self, ptc: Any) -> Any:
@@ -211,8 +225,11 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
     def _solve(self, stop: Any) -> Any:
         problem = self.getProblemDefinition()
         if self._propagator is None:
-            self._propagator = OmplPropagator(self.getSpaceInformation(), self._seeds.child("durations").generator())
+            durations = self._durations if self._durations[1] > 1 else None
+            self._propagator = OmplPropagator(self.getSpaceInformation(), durations)
         propagator, goal = self._propagator, problem.getGoal()
+        if problem is not self._problem:  # the same C++ object is the same in Python while it is held here
+            self._problem, self._tree = problem, None
         reached = self._add_starts(propagator, goal)
         tree = self._tree
         if tree is None:
@@ -245,32 +262,16 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
         """Expand a batch of nodes; return the node in the goal, or -1."""
         strategy, left, first = self._strategy, propagator.counter.left, len(tree)
         if self._compiled is not None and isinstance(propagator, ModelPropagator) and propagator.compiled is not None:
-            return _expand_compiled(self._compiled, propagator, tree, propagator.compiled, min(CHUNK, left))
+            count = max(min(CHUNK, FIRST_CHUNK + first), self._durations[1])
+            return _expand_compiled(self._compiled, propagator, tree, propagator.compiled, min(count, left))
         count = self._batch or min(strategy.batch(tree), propagator.max_batch)
         nodes = _checked_nodes(strategy, tree, strategy.select(tree, min(count, left)), min(count, left))
         controls = _checked_controls(strategy, strategy.controls(tree, nodes), len(nodes))
-        reached = propagator.expand(tree, nodes, controls, goal)
-        if reached < 0 and self._control_duration > 1:
-            reached = self._repeat_controls(propagator, tree, goal, first)
+        durations = _checked_durations(strategy, strategy.durations(tree, nodes), len(nodes))
+        reached = propagator.expand(tree, nodes, controls, durations, goal)
         if len(tree) > first:
             strategy.inserted(tree, first, len(tree))
         return reached
-
-    def _repeat_controls(self, propagator: BatchPropagator, tree: Tree, goal: Any, first: int) -> int:
-        """Apply the controls of the nodes from `first` on again, for as long as each lasts; return as above."""
-        nodes = np.arange(first, len(tree))
-        steps = self._rng.integers(0, self._control_duration, len(nodes))
-        for step in range(self._control_duration - 1):
-            continuing = np.flatnonzero((steps > step) & ~tree.terminal[nodes])[:propagator.counter.left]
-            if not len(continuing):
-                break
-            nodes, steps, before = nodes[continuing], steps[continuing], len(tree)
-            reached = propagator.expand(tree, nodes, tree.controls[nodes], goal)
-            if reached >= 0:
-                return reached
-            grown = np.arange(before, len(tree))  # fewer than `nodes` where a motion was not valid
-            nodes, steps = grown, steps[np.searchsorted(nodes, tree.parents[grown])]
-        return -1
 
 
 def _condition(ptc: Any) -> Any:
@@ -315,6 +316,19 @@ def _checked_nodes(strategy: Strategy, tree: Tree, nodes: Any, count: int) -> In
     if tree.terminal[nodes].any():
         raise CallbackFailed(f"{name} returned the node {nodes[tree.terminal[nodes]][0]}, which is terminal")
     return nodes
+
+
+def _checked_durations(strategy: Strategy, durations: Any, count: int) -> IndexArray:
+    """Refuse durations that cannot be applied.
+
+    Raises:
+        CallbackFailed: not an integer above 0 for each node.
+    """
+    if (not isinstance(durations, np.ndarray) or durations.shape != (count,) or durations.dtype != np.int64
+            or (durations < 1).any()):
+        raise CallbackFailed(f"{type(strategy).__name__}.durations returned {short_repr(durations)}; expected an array "
+                             f"of {count} integers (int64) above 0")
+    return durations
 
 
 def _checked_controls(strategy: Strategy, controls: Any, count: int) -> Array:

@@ -8,8 +8,8 @@ import numpy as np
 from pbcs_ompl.core.options import check_positive_integer
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import IndexArray
+from pbcs_ompl.planners.context import PlanningContext
 from pbcs_ompl.planners.planner import Strategy
-from pbcs_ompl.planners.propagators import PlanningContext
 
 
 class RandomWalk(Strategy):

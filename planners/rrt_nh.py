@@ -5,9 +5,9 @@ import numpy as np
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import IndexArray
+from pbcs_ompl.planners.context import PlanningContext
 from pbcs_ompl.planners.kernels import nearest
 from pbcs_ompl.planners.planner import Strategy
-from pbcs_ompl.planners.propagators import PlanningContext
 
 NODES_PER_BATCH = 100
 

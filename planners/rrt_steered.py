@@ -5,7 +5,7 @@ import numpy as np
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.planners.propagators import PlanningContext
+from pbcs_ompl.planners.context import PlanningContext
 from pbcs_ompl.planners.rrt_nh import RRTNH
 
 

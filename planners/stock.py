@@ -16,7 +16,7 @@ from ompl import util as ou
 
 from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable, UnsupportedSpace
 from pbcs_ompl.core.ompl_access import quiet_ompl
-from pbcs_ompl.core.options import check_names, check_positive_integer
+from pbcs_ompl.core.options import check_control_duration, check_names
 
 GRID_CELLS = 32
 GRID_PROBES = 16
@@ -40,7 +40,7 @@ class StockPlanner:
     def options(self) -> dict[str, Any]:
         """Return the options that the installed OMPL offers, with their defaults.
 
-        `control_duration` is the most steps that a control lasts; OMPL draws 1 to this many.
+        `control_duration` is the most steps that a control lasts, or the least and the most, all equally likely.
         """
         offered = dir(oc.__dict__.get(self.name))
         own = {option: default for option, (setter, default) in self.setters.items() if setter in offered}
@@ -63,10 +63,10 @@ class StockPlanner:
             raise PlannerUnavailable(f"the installed OMPL {version('ompl')} has no {self.name} in Python")
         check_names(f"planner {self.name!r}", "option", options, self.options())
         values = {**self.options(), **options}
-        duration = check_positive_integer("control_duration", values.pop("control_duration"))
+        least, most = check_control_duration(values.pop("control_duration"))
         with quiet_ompl():
-            if duration > 1:
-                si.setMinMaxControlDuration(1, duration)
+            if most > 1:
+                si.setMinMaxControlDuration(least, most)
             ou.RNG.setSeed(max(1, seed))
             planner = self._construct(kind, si)
             for option, value in values.items():

@@ -1,4 +1,4 @@
-"""Agents: DDPG, TD3, SAC and two variants of DDPG, stacked over seeds. Subpackages below it need no torch.
+"""Agents: DDPG, TD3, SAC, PPO and two variants of DDPG, stacked over seeds. Subpackages below it need no torch.
 
 Raises:
     MissingDependency: at import, when torch or safetensors is not installed.
@@ -18,6 +18,8 @@ from pbcs_ompl.agents.ddpg_argmax import DDPGArgmax, DDPGArgmaxSettings
 from pbcs_ompl.agents.ddpg_regression import DDPGRegression, DDPGRegressionSettings
 from pbcs_ompl.agents.noise import EpsilonGreedy, Gaussian, OrnsteinUhlenbeck, make_noise
 from pbcs_ompl.agents.policy import Policy
+from pbcs_ompl.agents.ppo import PPO, PPOSettings
+from pbcs_ompl.agents.rollout import Rollout, advantages
 from pbcs_ompl.agents.sac import SAC, SACSettings
 from pbcs_ompl.agents.settings import AgentSettings, preset_names, preset_version
 from pbcs_ompl.agents.stacked_agent import NonFiniteData, StackedAgent
@@ -25,6 +27,7 @@ from pbcs_ompl.agents.td3 import TD3, TD3Settings
 
 __all__ = [
     "DDPG",
+    "PPO",
     "SAC",
     "TD3",
     "AgentSettings",
@@ -37,10 +40,13 @@ __all__ = [
     "Gaussian",
     "NonFiniteData",
     "OrnsteinUhlenbeck",
+    "PPOSettings",
     "Policy",
+    "Rollout",
     "SACSettings",
     "StackedAgent",
     "TD3Settings",
+    "advantages",
     "make_noise",
     "preset_names",
     "preset_version",

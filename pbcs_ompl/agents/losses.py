@@ -168,3 +168,65 @@ def temperature_loss(log_temperature: Tensor, log_density: Tensor, target_entrop
         target_entropy: The entropy that the policy should have.
     """
     return -log_temperature * (log_density.mean(dim=(1, 2)) + target_entropy)
+
+
+def normal_log_density(inner: Tensor, means: Tensor, log_std: Tensor) -> Tensor:
+    """Return the logarithm of the density of a normal distribution [S, B].
+
+    Args:
+        inner: Where [S, B, A].
+        means: [S, B, A].
+        log_std: The logarithm of the standard deviation of each action [S, A].
+    """
+    wide = log_std[:, None]
+    noise = (inner - means) * (-wide).exp()
+    return (-0.5 * noise.square() - wide - 0.5 * log(2.0 * pi)).sum(dim=2)
+
+
+def clipped_policy_loss(actor: Network, observations: Tensor, inner: Tensor, log_density: Tensor, gains: Tensor,
+                        log_std: Tensor, clip: float) -> tuple[Tensor, Tensor, Tensor]:
+    """Return PPO's loss of the actor [S], an estimate of the KL divergence [S], and the means [S, B, A].
+
+        ratio = pi(a|s) / pi_before(a|s);  loss = -mean min(ratio A, clip(ratio, 1 - clip, 1 + clip) A)
+
+    Source: Schulman et al. (2017), Eq. 7; the divergence is the mean of ratio - 1 - log ratio (Schulman 2020,
+    "Approximating KL divergence", k3).
+
+    Args:
+        actor: The mean of pi, before its tanh.
+        observations: s [S, B, O].
+        inner: a, in half-widths of the action box [S, B, A].
+        log_density: log pi_before(a|s) [S, B].
+        gains: Advantages A [S, B].
+        log_std: The logarithm of the standard deviation of pi [S, A].
+        clip: How far a ratio counts.
+    """
+    means = actor(observations).tanh()
+    log_ratio = normal_log_density(inner, means, log_std) - log_density
+    return clipped_surrogate(log_ratio, gains, clip), (log_ratio.exp() - 1.0 - log_ratio).mean(dim=1), means
+
+
+def clipped_spread_loss(log_std: Tensor, means: Tensor, inner: Tensor, log_density: Tensor, gains: Tensor, clip: float,
+                        entropy_weight: float) -> Tensor:
+    """Return PPO's loss [S] as a function of the standard deviation, with the bonus of the entropy.
+
+    The entropy of a normal distribution is the sum of the logarithms of its standard deviations, and a constant.
+
+    Args:
+        log_std, means, inner, log_density, gains, clip: See `clipped_policy_loss`.
+        entropy_weight: Of the bonus.
+    """
+    log_ratio = normal_log_density(inner, means, log_std) - log_density
+    return clipped_surrogate(log_ratio, gains, clip) - entropy_weight * log_std.sum(dim=1)
+
+
+def clipped_surrogate(log_ratio: Tensor, gains: Tensor, clip: float) -> Tensor:
+    """Return -mean min(ratio A, clip(ratio, 1 - clip, 1 + clip) A) [S]; Schulman et al. (2017), Eq. 7.
+
+    Args:
+        log_ratio: The logarithm of the ratio [S, B].
+        gains: Advantages A [S, B].
+        clip: How far a ratio counts.
+    """
+    ratio = log_ratio.exp()
+    return -torch.minimum(ratio * gains, ratio.clamp(1.0 - clip, 1.0 + clip) * gains).mean(dim=1)

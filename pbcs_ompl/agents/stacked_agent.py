@@ -79,7 +79,7 @@ class StackedAgent(ABC):
                  device: str | torch.device = "cpu", compile: Compile = "auto"):
         self.settings = settings or self.settings_type()
         self.observation_size = observation_size
-        self.action_low, self.action_high = _action_box(action_low, action_high)
+        self.action_low, self.action_high = action_box(action_low, action_high)
         self.action_size = len(self.action_low)
         self.seeds = tuple(int(seed) for seed in seeds)
         if not self.seeds or observation_size < 1:
@@ -275,13 +275,7 @@ class StackedAgent(ABC):
 
     def policy(self, seed_index: int = 0) -> Policy:
         """Return a copy of one seed's actor that no longer changes."""
-        layers: list[tuple[np.ndarray, ...]] = []
-        for weight, *vectors in (layer.tensors() for layer in self.actor.weights.layers):
-            parts = (weight[seed_index], *(vector[seed_index, 0] for vector in vectors))
-            layers.append(tuple(part.cpu().numpy().copy() for part in parts))
-        actions = self.action_size
-        layers[-1] = tuple(np.ascontiguousarray(part[..., :actions]) for part in layers[-1])
-        return Policy(tuple(layers), self.action_low.copy(), self.action_high.copy())
+        return policy_of(self.actor, seed_index, self.action_low, self.action_high)
 
     def state_dict(self, indices: Sequence[int] | None = None) -> dict[str, np.ndarray]:
         """Return everything that training needs to continue bit for bit, as named arrays.
@@ -338,7 +332,28 @@ class StackedAgent(ABC):
         return torch.from_numpy(np.asarray(values, dtype=np.float32)).to(self.device)
 
 
-def _action_box(low: Any, high: Any) -> tuple[Array, Array]:
+def policy_of(actor: TrainedNetwork, seed_index: int, low: Array, high: Array) -> Policy:
+    """Return a copy of one actor of a stack that no longer changes.
+
+    Args:
+        actor: Its first A outputs, through a tanh, are the action.
+        seed_index: Which one.
+        low, high: The action box [A].
+    """
+    layers: list[tuple[np.ndarray, ...]] = []
+    for weight, *vectors in (layer.tensors() for layer in actor.weights.layers):
+        parts = (weight[seed_index], *(vector[seed_index, 0] for vector in vectors))
+        layers.append(tuple(part.cpu().numpy().copy() for part in parts))
+    layers[-1] = tuple(np.ascontiguousarray(part[..., :len(low)]) for part in layers[-1])
+    return Policy(tuple(layers), low.copy(), high.copy())
+
+
+def action_box(low: Any, high: Any) -> tuple[Array, Array]:
+    """Return the bounds of actions [A] as arrays.
+
+    Raises:
+        UnsupportedSpace: the box is empty or not finite.
+    """
     low, high = np.array(low, dtype=np.float64), np.array(high, dtype=np.float64)
     if low.ndim != 1 or low.shape != high.shape or not len(low):
         raise UnsupportedSpace(f"action bounds of shapes {low.shape} and {high.shape}, expected (A,) twice")

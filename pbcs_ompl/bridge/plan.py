@@ -179,7 +179,7 @@ def _warm_up(model: ResettableModel, spec: PlannerSpec, planner: Any) -> None:
     behind; else one in a toy, because an environment that is stepped makes no steps beyond its budget.
     """
     pure = isinstance(model, VectorisedModel)
-    key = (spec.name, model.spec.label if pure else TOY)
+    key = (spec.name, model.spec.id if pure else TOY)
     if key in _warm:
         return
     _warm.add(key)

@@ -13,7 +13,7 @@ from pbcs_ompl.core.errors import DamagedFile, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import path_control, value_reader
 from pbcs_ompl.core.plain import plain
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable.actions import ActionMap, Actions
 from pbcs_ompl.results.arrays import NUMBERS, take, take_words
 from pbcs_ompl.results.files import read_arrays, write_arrays
@@ -172,19 +172,28 @@ def to_trajectory(path: Any, space_information: Any, model: ResettableModel, *, 
     read = value_reader(space_information.getStateSpace())
     read_control = value_reader(space_information.getControlSpace())
     step_size = space_information.getPropagationStepSize()
-    states, controls = [np.array(read(path.getState(0)))], []
-    for index in range(path.getControlCount()):
-        steps = _whole_steps(path.getControlDuration(index), step_size)
-        control = np.array(read_control(path.getControl(index)))
-        for _ in range(steps - 1):
-            states.append(model.transition(states[-1][None], control[None]).states[0])
-        states.append(np.array(read(path.getState(index + 1))))
-        controls += [control] * steps
-    all_states, all_controls = np.array(states), np.array(controls).reshape(len(controls), len(model.action_low))
-    rewards = model.transition(all_states[:-1], all_controls).rewards if controls else np.empty(0)
-    actions = all_controls if model.env is None else ActionMap.of(model.env.action_space).to_actions(all_controls)
-    return Trajectory(environment=model.spec, states=all_states, actions=actions,
+    steps = np.array([_whole_steps(path.getControlDuration(index), step_size)
+                      for index in range(path.getControlCount())], dtype=np.int64)
+    ends = np.array([read(path.getState(index)) for index in range(len(steps) + 1)])
+    held = np.array([read_control(path.getControl(index)) for index in range(len(steps))])
+    held = held.reshape(len(steps), len(model.action_low))
+    states, controls = _every_state(model, ends, held, steps), np.repeat(held, steps, axis=0)
+    rewards = model.transition(states[:-1], controls).rewards if len(steps) else np.empty(0)
+    actions = controls if model.env is None else ActionMap.of(model.env.action_space).to_actions(controls)
+    return Trajectory(environment=model.spec, states=states, actions=actions,
                       rewards=np.asarray(rewards, dtype=np.float64), planner=planner, seed=seed, reset_seed=reset_seed)
+
+
+def _every_state(model: ResettableModel, ends: Array, controls: Array, steps: IndexArray) -> Array:
+    """Return the states at every step: those where controls end [T+1, D], and between them what the model says."""
+    places = np.concatenate([[0], np.cumsum(steps)])
+    states = np.empty((places[-1] + 1, ends.shape[1]))
+    states[places] = ends
+    for taken in range(1, int(steps.max(initial=1))):
+        going = np.flatnonzero(steps > taken)
+        before = places[going] + taken - 1
+        states[before + 1] = model.transition(states[before], controls[going]).states
+    return states
 
 
 def to_path(trajectory: Trajectory, space_information: Any) -> Any:

@@ -10,13 +10,14 @@ import warnings
 from argparse import Namespace
 from collections.abc import Sequence
 from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 from pbcs_ompl.cli.arguments import build_parser, parse
 from pbcs_ompl.cli.streams import OutputClosed, flush_output, print_error, survive_encodings
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.formatting import one_line
-from pbcs_ompl.core.signals import signal_of, signals_interrupt
+from pbcs_ompl.core.signals import interruptible, signal_of, signals_interrupt
 from pbcs_ompl.core.trust import module_names
 
 MOST_LETTERS = 100
@@ -61,9 +62,19 @@ def _dispatch(words: list[str]) -> int:
     if _imports(arguments) and "" not in sys.path:
         sys.path.append("")  # `--planner my_module:MyPlanner` finds a module in the working directory
     try:
-        return int(import_module(f"pbcs_ompl.cli.{arguments.verb}").run(arguments))
+        return int(_import(arguments.verb).run(arguments))
     except SystemExit as error:
         raise PbcsError(f"code that pbcs {arguments.verb} has called left with sys.exit({error.code!r})") from error
+
+
+def _import(verb: str) -> ModuleType:
+    """Return the module of a verb; a signal waits, since an exception within an import of OMPL ends the process."""
+    stops: list[KeyboardInterrupt] = []
+    with interruptible(stops.append):
+        module = import_module(f"pbcs_ompl.cli.{verb}")
+    if stops:
+        raise stops[0]
+    return module
 
 
 def _imports(arguments: Namespace) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from pbcs_ompl.cli.streams import print_output
-from pbcs_ompl.cli.values import choice, fraction, integer, json_object, part, seconds
+from pbcs_ompl.cli.values import choice, fraction, integer, json_object, json_objects, part, seconds
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
@@ -134,6 +134,7 @@ def _plan(verb: Parser) -> None:
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop after this much wall time")
     verb.add_argument("--video", metavar="FILE", help="film the path that was found; .mp4 or .gif")
     _add_out(verb)
+    verb.add_argument("--no-pictures", action="store_true", help="write no tree.png, which takes half a second")
 
 
 def _train(verb: Parser) -> None:
@@ -153,6 +154,10 @@ def _train(verb: Parser) -> None:
                       help="agent settings that differ from the preset, such as '{\"hidden\": [128, 128]}'")
     verb.add_argument("--path", metavar="DIR",
                       help="train along this plan, a folder of pbcs plan or a trajectory")
+    verb.add_argument("--lines", type=choice("kind of lines", ("random",)), metavar="KIND",
+                      help="random: with --method follow, train one policy for any line of a robot, on random ones")
+    verb.add_argument("--worlds", type=json_objects, metavar="JSON",
+                      help="of --lines: options that differ from world to world, such as '[{\"maze_seed\": 1}]' (one)")
     _add_seed(verb)
     verb.add_argument("--max-transitions", type=integer(1), metavar="N",
                       help="stop after N environment steps (10,000,000)")
@@ -162,8 +167,14 @@ def _train(verb: Parser) -> None:
 
 
 def _eval(verb: Parser) -> None:
-    """run a trained chain of skills many times from the start"""
-    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train")
+    """run a trained chain of skills, or a robot's follower, many times from the start"""
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train, or ant: the follower that comes with pbcs")
+    verb.add_argument("--path", metavar="DIR", help="of a follower: the plan to drive along, a folder of pbcs plan")
+    verb.add_argument("--env", metavar="ID", help="of a follower, without --path: drive the shortest way to the goal")
+    verb.add_argument("--env-kwargs", type=json_object, default={}, metavar="JSON",
+                      help="of --env: options of the environment")
+    verb.add_argument("--seed", type=integer(0), default=0, metavar="N",
+                      help="of a follower: seed of its starts and of random actions (0)")
     verb.add_argument("--episodes", type=integer(1), default=100, metavar="N", help="how many rollouts (100)")
     verb.add_argument("--epsilon", type=fraction, default=0.0, metavar="E",
                       help="probability of a random action in each step (0)")

@@ -5,7 +5,9 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
+from pbcs_ompl.cli import eval_follower
 from pbcs_ompl.cli.terminal import print_summary
+from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import format_number, format_rate
 from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
@@ -19,6 +21,12 @@ from pbcs_ompl.skills.load_chain import load_chain
 def run(arguments: Namespace) -> int:
     """Evaluate and report. Returns 1 when no rollout reached the goal."""
     folder = Path(arguments.dir)
+    place = eval_follower.follower_folder(folder)
+    if place is not None:
+        return eval_follower.run(arguments, place)
+    if arguments.path or arguments.env or arguments.env_kwargs or arguments.seed:
+        raise InvalidOption("--path, --env, --env-kwargs and --seed are for a robot's follower; a chain of skills "
+                            "drives where it was trained")
     chain = load_chain(folder / CHAIN if (folder / CHAIN).is_dir() else folder, trust=arguments.trust)
     if arguments.video:
         check_video(arguments.video)

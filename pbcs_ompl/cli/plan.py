@@ -12,7 +12,6 @@ from pbcs_ompl.cli.pictures import draw_tree
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.formatting import format_duration, format_number
 from pbcs_ompl.core.interfaces import ResettableModel
-from pbcs_ompl.figures.video import check_video, write_video
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, environment_words
 
@@ -23,10 +22,15 @@ def run(arguments: Namespace) -> int:
     model = make(environment(arguments))
     note_rules(model)
     if arguments.video:
+        from pbcs_ompl.figures.video import check_video  # here, because matplotlib takes a third of a second
+
         check_video(arguments.video)
     result = finished_plan(arguments, out) or _plan(arguments, model, out)
-    draw_tree(model, result, out)
+    if not arguments.no_pictures:
+        draw_tree(model, result, out)
     if arguments.video and result.trajectory is not None:
+        from pbcs_ompl.figures.video import write_video
+
         write_video(model, result.trajectory.states, arguments.video)
     print_summary(result.summary(), _closing_lines(arguments, result, out), as_json=arguments.json)
     return 0 if result.solved else 1

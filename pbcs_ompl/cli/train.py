@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pbcs_ompl.bridge.trajectory import Trajectory
+from pbcs_ompl.cli import train_follower
 from pbcs_ompl.cli.arguments import build_parser, environment
 from pbcs_ompl.cli.finished import lacks_picture_only
 from pbcs_ompl.cli.folders import fresh_folder
@@ -17,7 +18,7 @@ from pbcs_ompl.core.trust import module_names
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words, resume_words
 from pbcs_ompl.results.files import CHAIN, CONFIG, TRAJECTORY
-from pbcs_ompl.results.folder import RunFolder, read_folder
+from pbcs_ompl.results.folder import RunFolder, read_config, read_folder
 from pbcs_ompl.skills import TrainResult, resume, train
 from pbcs_ompl.skills.load_chain import load_chain
 from pbcs_ompl.skills.trained_controller import TrainedController
@@ -28,9 +29,15 @@ def run(arguments: Namespace) -> int:
     if arguments.resume:
         _refuse_other_options(arguments)
         out = Path(arguments.resume)
+        if (out / CONFIG).is_file() and read_config(out)["kind"] == "follower":
+            return train_follower.run(arguments)
         if lacks_picture_only(out):
             return _draw_only(out, trust=arguments.trust, as_json=arguments.json)
+    elif arguments.lines is not None:
+        return train_follower.run(arguments)
     else:
+        if arguments.worlds is not None:
+            raise InvalidOption("--worlds goes with --lines random")
         if arguments.env is None:
             raise InvalidOption("--env is missing (see pbcs train --help)")
         out = Path(arguments.out or fresh_folder("train", arguments.env, arguments.method, arguments.seed))

@@ -10,6 +10,7 @@ from pbcs_ompl.core.text_values import parse_json, shortened
 from pbcs_ompl.core.utf8 import joined
 
 EXPECTED_OBJECT = "expected a JSON object such as '{\"size\": 5}'"
+EXPECTED_OBJECTS = "expected a JSON list of objects such as '[{\"size\": 4}, {\"size\": 5}]'"
 
 
 def integer(low: int) -> Callable[[str], int]:
@@ -64,6 +65,17 @@ def part(text: str) -> tuple[int, int]:
     if not (slash and index.isdecimal() and count.isdecimal()):
         raise ArgumentTypeError(f"expected a part such as 2/3, got {text!r}")
     return int(index), int(count)
+
+
+def json_objects(text: str) -> list[dict[str, Any]]:
+    """Read a JSON list of objects."""
+    try:
+        values = parse_json(joined(text))
+    except ValueError as error:
+        raise ArgumentTypeError(f"{EXPECTED_OBJECTS}, got {shortened(text)!r}: {error}") from error
+    if not isinstance(values, list) or not values or not all(isinstance(value, dict) for value in values):
+        raise ArgumentTypeError(f"{EXPECTED_OBJECTS}, got {shortened(text)!r}")
+    return values
 
 
 def json_object(text: str) -> dict[str, Any]:

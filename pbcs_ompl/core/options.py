@@ -9,6 +9,9 @@ from pbcs_ompl.core.checked import short_repr
 from pbcs_ompl.core.errors import InvalidOption, did_you_mean
 from pbcs_ompl.core.types import Array
 
+MOST_STEPS = 10**6
+"""What a control lasts at most."""
+
 
 def check_names(owner: str, kind: str, given: Collection[str], known: Collection[str]) -> None:
     """Refuse names that do not exist.
@@ -70,6 +73,19 @@ def check_positive_integer(name: str, value: Any) -> int:
     check_range(name, value, isinstance(value, int) and not isinstance(value, bool) and value > 0,
                 "an integer above 0")
     return int(value)
+
+
+def check_control_duration(value: Any) -> tuple[int, int]:
+    """Return the least and the most steps of a control: 1 and the value, or the two numbers of a sequence.
+
+    Raises:
+        InvalidOption: neither an integer above 0 nor two of them, the smaller one first.
+    """
+    both = value if isinstance(value, list | tuple) else (1, value)
+    integers = all(isinstance(steps, int) and not isinstance(steps, bool) for steps in both)
+    check_range("control_duration", value, integers and len(both) == 2 and 0 < both[0] <= both[1] <= MOST_STEPS,
+                f"an integer from 1 to {MOST_STEPS}, or two, the least steps of a control and the most")
+    return both[0], both[1]
 
 
 def check_positive_numbers(name: str, value: Any) -> Array:

@@ -37,17 +37,18 @@ class Tree:
         state_size: D.
         control_size: A; 0 for the tree of a planner that does not report its controls.
         feature_size: F, or None where the state is the feature.
-        expected: How many nodes there may be, if that is known: address space is reserved for them.
+        expected: How many nodes there may be, if that is known: once there are many, address space is reserved for
+            all. Before that it would be slow, because Linux clears new memory in huge pages, one for each array.
     """
 
     def __init__(self, state_size: int, control_size: int, feature_size: int | None = None, *,
                  expected: int = 0):
         node_bytes = 8 * (state_size + (feature_size or 0) + control_size) + 13
-        rows = max(FIRST_ROWS, min(expected, MOST_RESERVED // node_bytes))
-        states = np.empty((rows, state_size))
-        features = states if feature_size is None else np.empty((rows, feature_size))
-        self.columns = Columns(states, features, np.empty((rows, control_size)), np.empty(rows, np.int32),
-                               np.empty(rows), np.empty(rows, np.bool_))
+        self._expected = min(expected, MOST_RESERVED // node_bytes)
+        states = np.empty((FIRST_ROWS, state_size))
+        features = states if feature_size is None else np.empty((FIRST_ROWS, feature_size))
+        self.columns = Columns(states, features, np.empty((FIRST_ROWS, control_size)), np.empty(FIRST_ROWS, np.int32),
+                               np.empty(FIRST_ROWS), np.empty(FIRST_ROWS, np.bool_))
         self._size = 0
 
     @classmethod
@@ -135,7 +136,7 @@ class Tree:
         """Allocate space for `count` more nodes."""
         needed = self._size + count
         if needed > len(self.columns.parents):
-            self.columns = self._resized(max(needed, GROWTH * len(self.columns.parents)))
+            self.columns = self._resized(max(needed, self._expected, GROWTH * len(self.columns.parents)))
 
     def claim(self, count: int) -> None:
         """Count in `count` nodes that were written into the columns behind the last one."""
@@ -151,7 +152,7 @@ class Tree:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the nodes without the reserved rows, for pickle."""
-        return {"columns": self._resized(self._size), "_size": self._size}
+        return {"columns": self._resized(self._size), "_size": self._size, "_expected": 0}
 
     def _resized(self, rows: int) -> Columns:
         distinct = {id(column): column for column in self.columns}

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.robot import Robot
 from pbcs_ompl.core.types import Array, BoolArray, Capability
 
 REQUIRED = ("get_env_state", "set_env_state", "transition")
@@ -60,6 +61,8 @@ class EnvAttributes:
         "none", "the step for compiled planners, of vectorised environments; see docs/planners.md")
     walls: Array | None = _optional("none", "rectangles [W, 4] (x0, y0, x1, y1), for pictures")
     goal_circle: tuple[float, float, float] | None = _optional("none", "centre and radius (x, y, r), for pictures")
+    robot: Robot | None = _optional(
+        "none", "what moves in the plane of the feature: its heading and symmetries, a `pbcs_ompl.core.robot.Robot`")
 
     def __post_init__(self) -> None:
         for name in FUNCTIONS:

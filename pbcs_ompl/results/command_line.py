@@ -62,6 +62,14 @@ def train_words(config: dict[str, Any], trajectory: Path | None = None) -> Words
             *_json_words("--agent-settings", config["agent_settings"]), *_budgets(config)]
 
 
+def follower_words(config: dict[str, Any]) -> Words:
+    """Return the words of the training of a robot's follower."""
+    worlds = "[" + ", ".join(config["worlds"]) + "]"
+    return ["train", "--method", "follow", "--lines", "random", *_environment(config), "--worlds", worlds, "--seed",
+            str(config["seed"]), *_json_words("--settings", config["settings"]),
+            *_json_words("--agent-settings", config["agent_settings"]), *_budgets(config)]
+
+
 def resume_words(folder: Path, max_transitions: int | None = None, *, trust: bool = False) -> Words:
     """Return the words that resume a training in a folder.
 

@@ -27,8 +27,8 @@ CONFIG, RESULT, PROVENANCE = "config.toml", "result.json", "provenance.json"
 """Every folder: the settings that repeat the run, what it found, with which versions and machines."""
 TRAJECTORY, TREE = "trajectory.npz", "tree.npz"
 """pbcs plan: the path to the goal, and all states that were visited."""
-PLAN, CHECKPOINT, CHAIN = "plan.json", "checkpoint.npz", "chain"
-"""pbcs train: the effort of planning, what --resume needs, and the folder of the skill chain."""
+PLAN, CHECKPOINT, CHAIN, FOLLOWER = "plan.json", "checkpoint.npz", "chain", "follower"
+"""pbcs train: the effort of planning, what --resume needs, and the folder of the skill chain, or of the follower."""
 RUNS, FIGURES = "runs", "figures"
 """pbcs compare and pbcs study: the folders of the records, and of the pictures of a study."""
 Content = TypeVar("Content")
@@ -71,8 +71,8 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], object]) -> None:
             raise
 
 
-TEMPORARY = re.compile(r"\..+\.[0-9a-f]{8}")
-"""The names of the files that `write_atomically` renames at its end."""
+TEMPORARY = re.compile(r"\..+\.[0-9a-f]{8}(-journal)?")
+"""The names of the files that `write_atomically` renames at its end, and of what SQLite writes beside one."""
 
 
 def sweep_temporaries(folder: Path) -> None:

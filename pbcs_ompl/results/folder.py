@@ -27,7 +27,7 @@ from pbcs_ompl.results.provenance import provenance
 from pbcs_ompl.results.schema import CONFIGS, RESULTS, Provenance, check
 
 KINDS = tuple(CONFIGS)
-"""What a folder may hold: the `kind` of its config.toml, named after the verb that wrote it."""
+"""What a folder may hold: the `kind` of its config.toml."""
 LOCK = ".lock"
 
 

@@ -57,6 +57,18 @@ class TrainConfig(TypedDict):
     versions: NotRequired[Versions]
 
 
+class FollowerConfig(TypedDict):
+    """config.toml of the training of a robot's follower; each world is a JSON text of its options."""
+
+    environment: EnvValues
+    worlds: list[str]
+    settings: Table
+    agent_settings: Table
+    seed: Count
+    max_transitions: Positive
+    versions: NotRequired[Versions]
+
+
 class EvalConfig(TypedDict):
     """config.toml of an evaluation."""
 
@@ -85,8 +97,8 @@ class StudyConfig(TypedDict):
 
 
 CONFIGS: dict[str, Any] = {"plan": PlanConfig, "train": TrainConfig, "eval": EvalConfig, "compare": CompareConfig,
-                           "study": StudyConfig}
-"""What config.toml holds, by its `kind`: the verb that wrote it."""
+                           "study": StudyConfig, "follower": FollowerConfig}
+"""What config.toml holds, by its `kind`: the verb that wrote it, or the result of `pbcs train --lines`."""
 
 
 class PlanResult(TypedDict):
@@ -111,6 +123,15 @@ class TrainResult(TypedDict):
     skills: Count
     plan_transitions: Count
     train_transitions: Count
+    updates: Count
+    seconds: Seconds
+
+
+class FollowerResult(TypedDict):
+    """result.json of the training of a robot's follower."""
+
+    test_rate: float
+    transitions: Count
     updates: Count
     seconds: Seconds
 
@@ -144,7 +165,7 @@ class StudyResult(TypedDict):
 
 
 RESULTS: dict[str, Any] = {"plan": PlanResult, "train": TrainResult, "eval": EvalResult, "compare": Table,
-                           "study": StudyResult}
+                           "study": StudyResult, "follower": FollowerResult}
 """What result.json holds; a comparison is read from its records."""
 Provenance = list[Versions]
 

@@ -1,110 +1,81 @@
 """Ex as one compiled loop: select, draw a control, step, insert ([Matheron2020] Alg. 5, lines 7 to 12)."""
 
-from typing import Any
-
 import numpy as np
-from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.planners.compiled import STEP_TYPE
-from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, cell_of, find_cell, grow_and_add
+from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, call_step
+from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, grow_and_add
+from pbcs_ompl.planners.kernels.cells import cell_of, find_cell
+from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
+from pbcs_ompl.planners.kernels.memory import prefetch, uncounted
 from pbcs_ompl.planners.kernels.runs import MEMBER, choose, peek
-
-DONE, GOAL, FULL, NOT_FINITE = range(4)
 
 _matrix = types.float64[:, ::1]
 _vector = types.float64[::1]
 _integers = types.int64[::1]
-COLUMNS_TYPE = types.NamedTuple(
-    (_matrix, _matrix, _matrix, types.int32[::1], _vector, types.boolean[::1]), Columns)
-"""Numba's type of `pbcs_ompl.core.tree.Columns`."""
 
 
-@intrinsic
-def prefetch(typing_context: Any, array: Any, row: Any) -> Any:
-    """Fetch the first cache line of array[row] of a two-dimensional array into the cache; changes no value."""
-    signature = types.void(array, types.intp)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array_type = signature.args[0]
-        structure = context.make_array(array_type)(context, builder, arguments[0])
-        first = context.get_constant(types.intp, 0)
-        pointer = cgutils.get_item_pointer(context, builder, array_type, structure, [arguments[1], first])
-        byte, flag = ir.PointerType(ir.IntType(8)), ir.IntType(32)
-        function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag]), "llvm.prefetch.p0")
-        read, keep, data = (ir.Constant(flag, value) for value in (0, 3, 1))
-        builder.call(function, [builder.bitcast(pointer, byte), read, keep, data])
-        return context.get_dummy_value()
-
-    return signature, generate
-
-
-@njit()
-def _finite(states: Array, row: int) -> bool:
-    total = 0.0
-    for axis in range(states.shape[1]):
-        total += states[row, axis] - states[row, axis]
-    return total == 0.0
-
-
-@njit(types.UniTuple(types.int64, 2)(
-    STEP_TYPE, types.Tuple((_vector, _matrix, _integers)), _integers, _matrix, COLUMNS_TYPE, types.int64,
-    QUEUE_TYPE, _vector, _matrix))
-def expand(step: Any, parameters: tuple[Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
-           columns: Columns, first: int, queue: BinQueue, bin_size: Array, uniforms: Array) -> tuple[int, int]:
-    """Expand a node for each row of `uniforms` [B, 2 + A] (bin, node, control); new nodes begin at `first`.
+@njit(types.Tuple((types.int64, types.boolean))(
+    PARAMETERS_TYPE, _integers, _matrix, types.UniTuple(types.int64, 2),
+    COLUMNS_TYPE, types.int64, types.int64, QUEUE_TYPE, _vector, _matrix), error_model="numpy")
+def expand(parameters: tuple[int, Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
+           durations: tuple[int, int], columns: Columns, first: int, most: int, queue: BinQueue, bin_size: Array,
+           uniforms: Array) -> tuple[int, bool]:
+    """Expand a node for each row of `uniforms` [B, 2 + A (+ 1)]: bin, node, control, and its duration.
 
     Args:
-        step, parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
+        parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
         feature_dims: Dimensions of the state that are the feature [F].
         bounds: Lower and upper bounds of the controls [2, A].
-        columns: The tree's arrays, with space for B more nodes.
-        first: The number of nodes so far.
-        queue, bin_size: The counters, and the edges of the bins [F].
+        durations: The least and the most steps of a control; if these are equal, `uniforms` has no column for
+            them.
+        columns, first: The tree's arrays, with space for `most` more nodes, and the number of nodes so far.
+        most: The most steps, of all controls together.
+        queue, bin_size: The counters, with space for `most` more nodes, and the edges of the bins [F].
 
     Returns:
-        How many nodes were written, and why the loop ended. Unless DONE, the last of them is not in the
-        queue: it is the goal, or the queue was too small for it, or its state is not finite.
+        How many nodes were written, and whether the last one is the goal. A state that is not finite ends the loop
+        as well; it is the last one and not in the queue.
     """
-    # Fields of named tuples are counted references: in the loop they would cost more than the work.
-    reals, table, integers = parameters
-    states, features, controls, parents, rewards, ends = columns
-    pool, heads, order, head = queue.pool, queue.heads, queue.order, queue.head
-    cells, places = queue.cells, queue.table
+    address, reals, table, integers = uncounted(parameters)
+    states, features, controls, parents, rewards, ends = uncounted(columns)
+    queue = uncounted(queue)
+    pool, heads, order, head, cells, places = queue.pool, queue.heads, queue.order, queue.head, queue.cells, queue.table
+    least, longest = durations
     cell = np.empty(len(bin_size), np.int64)
-    done = 0
+    child, end = first, first + most
     for row in range(len(uniforms)):
         node = choose(pool, heads, choose(order, head, 0, uniforms[row, 0]), uniforms[row, 1])
         # The next choice is known already unless this child opens a bin: fetch its memory while others work.
         following = min(row + 1, len(uniforms) - 1)
         ahead = peek(heads, order[peek(head, 0, uniforms[following, 0]), MEMBER], uniforms[following, 1])
         prefetch(pool, ahead)
-        child = first + row
-        for axis in range(bounds.shape[1]):
-            low, high = bounds[0, axis], bounds[1, axis]
-            controls[child, axis] = low + (high - low) * uniforms[row, 2 + axis]
-        reward, terminal, success = step(reals, table, integers, states, node, controls, child)
-        prefetch(states, pool[ahead, MEMBER])
-        for axis in range(len(feature_dims)):
-            features[child, axis] = states[child, feature_dims[axis]]
-        parents[child] = node
-        rewards[child] = reward
-        ends[child] = terminal
-        done = row + 1
-        if not _finite(states, child):
-            return done, NOT_FINITE
-        if success:
-            return done, GOAL
-        if terminal:
-            continue
-        cell_of(features, child, bin_size, cell)
-        place = find_cell(cells, places, cell)
-        if not (add(pool, heads, places[place] - 1, child) or grow_and_add(queue, cell, place, child)):
-            return done, FULL
-    return done, DONE
+        steps = longest
+        if longest > least:
+            steps = least + int(uniforms[row, 2 + bounds.shape[1]] * (longest - least + 1))
+        for taken in range(min(steps, end - child)):
+            for axis in range(bounds.shape[1]):
+                low, high = bounds[0, axis], bounds[1, axis]
+                controls[child, axis] = low + (high - low) * uniforms[row, 2 + axis]
+            reward, terminal, success = call_step(address, reals, table, integers, states, node, controls, child)
+            if taken == 0:
+                prefetch(states, pool[ahead, MEMBER])
+            for axis in range(len(feature_dims)):
+                features[child, axis] = states[child, feature_dims[axis]]
+            parents[child], rewards[child], ends[child] = node, reward, terminal
+            node, child = child, child + 1
+            if not finite(states, node):
+                return child - first, False
+            if not terminal:
+                cell_of(features, node, bin_size, cell)
+                place = find_cell(cells, places, cell)
+                if not add(pool, heads, places[place] - 1, node):
+                    grow_and_add(queue, cell, place, node)
+            if success:
+                return child - first, True
+            if terminal:
+                break
+    return child - first, False

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbcs_ompl.core.compiled import njit
-from pbcs_ompl.planners.kernels.bin_queue import BinQueue, find_cell
+from pbcs_ompl.planners.kernels.bin_queue import BinQueue
+from pbcs_ompl.planners.kernels.cells import find_cell
 from pbcs_ompl.planners.kernels.runs import LENGTH, MEMBER, START
 
 

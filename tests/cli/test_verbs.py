@@ -35,6 +35,13 @@ def pbcs(tmp_path, monkeypatch, capsys):
     return run
 
 
+def test_plan_without_pictures(pbcs, tmp_path):
+    status, plan, _ = pbcs(f"plan {MAZE} --seed 3 --no-pictures --out bare --json")
+    assert (status, plan["solved"]) == (0, True)
+    assert (tmp_path / "bare/tree.npz").exists()
+    assert not (tmp_path / "bare/tree.png").exists()
+
+
 def test_plan_then_train_then_eval(pbcs, tmp_path):
     status, plan, _ = pbcs(f"plan {MAZE} --seed 3 --json")
     assert status == 0

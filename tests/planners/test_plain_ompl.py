@@ -85,6 +85,32 @@ def test_equal_seeds_give_equal_trees_and_clear_continues_the_stream():
     assert setup.haveExactSolutionPath()
 
 
+def test_starts_that_are_added_are_used_and_another_problem_begins_at_its_own():
+    setup = car(valid=lambda state: 0 <= state.getX() <= 5 and 0 <= state.getY() <= 5 and not 2 < state.getX() < 3)
+    information = setup.getSpaceInformation()
+    planner = Ex.build(information, seed=1)
+    setup.setPlanner(planner)
+    setup.solve(0.3)
+    assert not setup.haveExactSolutionPath()
+    nodes = len(planner.tree)
+    second = information.allocState()
+    second.setX(3.5)
+    second.setY(1.0)
+    second.setYaw(0.0)
+    setup.addStartState(second)
+    planner.solve(20.0)
+    assert setup.haveExactSolutionPath()
+    assert len(planner.tree) > nodes
+    other = ob.ProblemDefinition(information)
+    other.addStartState(second)
+    other.setGoal(setup.getGoal())
+    planner.setProblemDefinition(other)
+    planner.solve(20.0)
+    assert other.hasExactSolution()
+    assert other.getSolutionPath().getState(0).getX() == 3.5
+    assert (planner.tree.parents < 0).sum() == 1
+
+
 def test_the_tree_is_that_of_the_projections():
     setup = car(valid=lambda state: state.getX() < 1.5)
     planner = Ex.build(setup.getSpaceInformation())

@@ -15,6 +15,7 @@ from pbcs_ompl.results.files import (
     read_arrays,
     read_json,
     read_toml,
+    sweep_temporaries,
     to_toml,
     write_arrays,
     write_atomically,
@@ -116,3 +117,15 @@ def test_full_disk_is_one_clear_line_and_leaves_nothing(tmp_path, monkeypatch, f
     assert list(tmp_path.iterdir()) == []
 
 
+
+
+def test_what_killed_processes_left_is_swept(tmp_path):
+    kept = [tmp_path / name for name in ("result.json", ".hidden", "comparison.db", ".comparison.db.0123abcd.txt")]
+    left = [tmp_path / "runs" / name for name in (".result.json.0123abcd", ".comparison.db.0123abcd",
+                                                  ".comparison.db.0123abcd-journal")]
+    left[0].parent.mkdir()
+    for path in kept + left:
+        path.write_text("x")
+    sweep_temporaries(tmp_path)
+    assert all(path.exists() for path in kept)
+    assert not any(path.exists() for path in left)

@@ -25,8 +25,7 @@ def granted(task: dict[str, object], path: Path) -> bool:
             assert action in env.action_space
             observation, reward, terminated, truncated, info = env.step(action)
         if task.get("check"):
-            names = {"obs": observation, "terminated": terminated,
-                     "qpos": getattr(getattr(env.unwrapped, "data", None), "qpos", None)}
+            names = {"obs": observation, "qpos": getattr(getattr(env.unwrapped, "data", None), "qpos", None)}
             reached = CHECKS[task["check"]](names)
         else:
             reached = bool(info.get("is_success", info.get("success", terminated and reward > 0)))
@@ -38,7 +37,7 @@ def granted(task: dict[str, object], path: Path) -> bool:
 
 
 CHECKS = {
-    "terminated": lambda names: names["terminated"],
+    "obs0>-0.3": lambda names: names["obs"][0] > -0.3,
     "obs0>0.2": lambda names: names["obs"][0] > 0.2,
     "obs0<0": lambda names: names["obs"][0] < 0.0,
     "qpos0>0.05": lambda names: names["qpos"][0] > 0.05,

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pbcs_ompl
 
+PLANNERS = ("Ex", "RRTNH", "KPIECE1", "RRT")
+
 
 def main(folder: Path, task: dict[str, object], seeds: range) -> None:
     """Plan with each seed, and write what is called solved, with its number of steps."""
@@ -14,7 +16,8 @@ def main(folder: Path, task: dict[str, object], seeds: range) -> None:
     found = solved = 0
     for seed in seeds:
         env = pbcs_ompl.EnvSpec(task["id"], task.get("kwargs", {}), goal=task.get("goal"))
-        result = pbcs_ompl.plan(env, ("Ex", "RRTNH", "KPIECE1", "RRT")[seed % 4], seed=seed, max_transitions=4_000)
+        result = pbcs_ompl.plan(env, PLANNERS[seed % len(PLANNERS)], seed=seed,
+                                max_transitions=task.get("budget", 4_000))
         found += result.found
         solved += result.solved
         if result.solved:

@@ -1,4 +1,4 @@
-"""A thousand plans in more than fifteen environments: what is called solved, a loop over `env.step` reaches.
+"""Over a thousand plans in fifteen environments: what is called solved, a loop over `env.step` reaches.
 
 The plans are made in one process for each environment, and executed in another one, by code without the toolkit.
 PLANS=N changes their number.
@@ -14,17 +14,15 @@ from typing import Any
 import pytest
 
 HERE = Path(__file__).parent
-NUMBER = int(os.environ.get("PLANS", "1000"))
+NUMBER = int(os.environ.get("PLANS", "1300"))
 ROBOTICS = {"modules": ["gymnasium_robotics"]}
-HARD = {"hard": True}
-"""Few of the plans are found within the budget, perhaps none."""
 TASKS: list[dict[str, Any]] = [
     {"id": "pbcs/Maze-v0", "kwargs": {"size": 2}}, {"id": "pbcs/Maze-v0", "kwargs": {"size": 3}},
     {"id": "pbcs/Maze-v0", "kwargs": {"size": 4, "collision_response": "slide"}},
     {"id": "pbcs/Maze-v0", "kwargs": {"size": 2, "normalize_actions": True, "wall_penalty": -1.0}},
-    {"id": "pbcs/Box-v0", **HARD}, {"id": "pbcs/Disc-v0", **HARD}, {"id": "pbcs/Toy1D-v0"},
-    {"id": "MountainCarContinuous-v0", **HARD},
-    {"id": "MountainCar-v0", "goal": "terminated>0", "check": "terminated", **HARD},
+    {"id": "pbcs/Box-v0", "kwargs": {"goal": [3.5, 3.5]}}, {"id": "pbcs/Disc-v0", "kwargs": {"goal": [2.2, 2.2]}},
+    {"id": "pbcs/Toy1D-v0"}, {"id": "MountainCarContinuous-v0", "budget": 20_000},
+    {"id": "MountainCar-v0", "goal": "obs[0]>-0.3", "check": "obs0>-0.3"},
     {"id": "CartPole-v1", "goal": "obs[0]>0.2", "check": "obs0>0.2"},
     {"id": "Acrobot-v1", "goal": "obs[0]<0", "check": "obs0<0"},
     {"id": "Pendulum-v1", "goal": "obs[0]<0", "check": "obs0<0"},
@@ -61,5 +59,5 @@ def test_what_is_called_solved_is_reached_by_a_loop_over_step(task: dict[str, An
     executed = output("executed.py", str(tmp_path), text)
     print(f"{task['id']}: {made}, {executed}")
     assert executed["executed"] == made["solved"]
-    assert made["solved"] > 0 or task.get("hard")
+    assert made["solved"] > 0
     assert executed["refused"] == []

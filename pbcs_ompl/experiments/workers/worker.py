@@ -182,7 +182,7 @@ def worker_main(connection: Connection) -> None:
         signal.signal(number, signal.SIG_IGN)  # they are for the parent, which ends its workers
     try:
         function = connection.recv()
-    except EOFError:
+    except (EOFError, ConnectionError):  # closed, or closed while the parent was stopped
         return
     except (Exception, SystemExit) as error:
         connection.send(describe(error))
@@ -191,9 +191,9 @@ def worker_main(connection: Connection) -> None:
     while True:
         try:
             run = connection.recv()
-        except EOFError:
+            connection.send(_found(function, run))
+        except (EOFError, ConnectionError):
             return
-        connection.send(_found(function, run))
 
 
 def _found(function: RunFunction, run: Run) -> Record | Failure:

@@ -78,7 +78,8 @@ def read_content(folder: Folder) -> Content:
         DamagedFile: a record in it is damaged.
     """
     readers: dict[str, Callable[[Folder], Content]] = {
-        "plan": _plan, "train": _training, "eval": _evaluation, "compare": _comparison, "study": _study}
+        "plan": _plan, "train": _training, "eval": _evaluation, "compare": _comparison, "study": _study,
+        "follower": _follower}
     return readers[folder.kind](folder)
 
 
@@ -111,6 +112,18 @@ def _training(folder: Folder) -> Content:
     reason = result["reason"]
     return Content(title, "solved" if result["solved"] else "not solved", result["solved"], summary,
                    str(config["seed"]), failures=[] if result["solved"] else [("not solved", reason)])
+
+
+def _follower(folder: Folder) -> Content:
+    config, result = folder.config, folder.result
+    title = f"A follower of random lines in {len(config['worlds'])} worlds of {_environment(config)}"
+    if result is None:
+        return Content(title, UNFINISHED, None, [], str(config["seed"]))
+    return Content(title, f"{result['test_rate']:.0%} of the test lines", None,
+                   [("test lines without noise", f"{result['test_rate']:.0%}"),
+                    ("transitions", format_number(result["transitions"])),
+                    ("updates", format_number(result["updates"])), ("time", format_duration(result["seconds"]))],
+                   str(config["seed"]))
 
 
 def _evaluation(folder: Folder) -> Content:

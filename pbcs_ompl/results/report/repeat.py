@@ -15,6 +15,7 @@ from pbcs_ompl.results.command_line import (
     command,
     compare_words,
     eval_words,
+    follower_words,
     plan_words,
     resume_words,
     study_words,
@@ -45,6 +46,8 @@ def resuming(folder: Folder) -> str:
     if folder.kind == "train" and (folder.result is None or is_there(folder.path / CHECKPOINT)):
         budget = 2 * folder.config["max_transitions"] if folder.result else None
         return command(resume_words(folder.path, budget, trust=_names_modules(folder.config)))
+    if folder.kind == "follower" and folder.result is None:
+        return command(resume_words(folder.path, trust=bool(EnvSpec.from_dict(folder.config["environment"]).modules)))
     if folder.kind in ("compare", "study") and folder.result is None and repeating(folder).startswith("pbcs "):
         return command([*_words(folder), "--out", str(folder.path)])
     return ""
@@ -88,7 +91,8 @@ def _words(folder: Folder) -> Words:
         "eval": lambda: eval_words(config["chain"], episodes=config["episodes"], epsilon=config["epsilon"],
                                    trust=bool(EnvSpec.from_dict(config["environment"]).modules)),
         "compare": lambda: compare_words(config),
-        "study": lambda: _study_words(config)}
+        "study": lambda: _study_words(config),
+        "follower": lambda: follower_words(config)}
     return words[folder.kind]()
 
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.experiments.run import Failure
-from pbcs_ompl.experiments.workers import Limits, executors, make_executor
+from pbcs_ompl.experiments.workers import Limits, executors, make_executor, worker
 from pbcs_ompl.experiments.workers.start import CannotStart
 
 
@@ -155,3 +155,21 @@ def test_no_runs_no_processes():
 def test_limits_that_cannot_be_are_named(make, message):
     with pytest.raises(InvalidOption, match=message):
         make()
+
+
+@pytest.mark.parametrize("received", [0, 1])
+def test_a_parent_that_hangs_up_ends_a_worker_quietly(monkeypatch, received):
+    class HungUp:
+        messages = [do]  # noqa: RUF012 - of one test
+
+        def recv(self):
+            if received and self.messages:
+                return self.messages.pop()
+            raise ConnectionResetError
+
+        def send(self, message):
+            """Take no note of it."""
+
+    monkeypatch.setattr(worker, "end_with_parent", lambda: None)
+    monkeypatch.setattr(worker.signal, "signal", lambda *_: None)
+    worker.worker_main(HungUp())

@@ -1,0 +1,53 @@
+"""What moves in the plane of an environment, seen from a frame of its own: where it looks, and how it is symmetric."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pbcs_ompl.core.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Symmetry:
+    """A way to see a robot that is another one in the same world, and moves as the same one does.
+
+    With the matrices M and N: where the action a leads from observation o to o', away from walls, the action N a leads
+    from M o to M o'. The robot stays where it is.
+
+    Attributes:
+        observation: M [O, O].
+        action: N [A, A], a permutation with signs.
+    """
+
+    observation: Array
+    action: Array
+
+    @classmethod
+    def identity(cls, observation_size: int, action_size: int) -> "Symmetry":
+        """Return the one that every robot has."""
+        return cls(np.eye(observation_size), np.eye(action_size))
+
+
+class Robot(Protocol):
+    """What an environment declares of its robot, in its attribute `robot`: one policy serves all directions.
+
+    Attributes:
+        place: The entries of the observation that are its place (x, y); the explored feature as well.
+        symmetries: Ways to see it, the identity first.
+    """
+
+    place: tuple[int, int]
+    symmetries: tuple[Symmetry, ...]
+
+    def heading(self, observations: Array) -> Array:
+        """Return the directions [B] in which it looks, in radians from the x axis; 0 where it has none."""
+        ...
+
+    def turned(self, observations: Array, angles: Array) -> Array:
+        """Return what observations [B, O] would be if the whole world were turned by angles [B] about the origin."""
+        ...
+
+    def put(self, states: Array, places: Array, angles: Array) -> Array:
+        """Return states [B, D] with the robot moved to places [B, 2] and turned by angles [B] about itself."""
+        ...

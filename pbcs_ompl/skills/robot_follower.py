@@ -1,0 +1,213 @@
+"""A robot's follower: one policy that was trained once, and drives along any line in any maze."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypedDict
+
+import numpy as np
+
+from pbcs_ompl.agents.policy import Policy
+from pbcs_ompl.core.checked import checked
+from pbcs_ompl.core.env_spec import EnvSpec, EnvValues
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, UnknownName
+from pbcs_ompl.core.types import Array, IndexArray
+from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.actions import ActionMap, Actions
+from pbcs_ompl.results.files import read_bytes, read_json, write_json
+from pbcs_ompl.results.schema import Limit, Positive, Table, check
+from pbcs_ompl.skills.follower import Progress
+from pbcs_ompl.skills.line import Line, erase_loops
+from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
+from pbcs_ompl.skills.robot_view import RobotView
+from pbcs_ompl.skills.robot_worlds import robot_of
+
+STRUCTURE, POLICY = "follower.json", "follower.safetensors"
+FORMAT, VERSION = "pbcs_ompl robot follower", 1
+SHIPPED = Path(__file__).parent / "followers"
+GAP = 8.0
+"""Longest hop along each axis by which loops of a plan are erased, in spacings of lines (ours)."""
+
+
+class FollowerWords(TypedDict):
+    """What follower.json holds."""
+
+    environment: EnvValues
+    distances: list[Limit]
+    window: Limit
+    patience: Positive
+    spacing: Limit
+    clearance: Limit
+    action_shape: list[Positive]
+    training: Table
+    sha256: dict[str, str]
+
+
+class RobotController:
+    """Drives episodes along one line: a pointer for each of them moves forward on it.
+
+    Attributes:
+        progress: How far each episode has come [B].
+
+    Args:
+        policy: Its actions are those of the side that leads.
+        view: What it sees.
+        line: Where to go.
+        actions: The action space.
+        entries: The entries of an observation that are the robot's observation, in its order; None for all.
+    """
+
+    def __init__(self, policy: Policy, view: RobotView, line: Line, actions: ActionMap,
+                 entries: IndexArray | None = None):
+        self._policy, self._view, self._actions, self._entries = policy, view, actions, entries
+        self.line = line
+        self.reset()
+
+    def reset(self, count: int | None = None) -> None:
+        """Begin `count` episodes side by side; None for one, whose observations are vectors and not batches."""
+        self._single, number = count is None, 1 if count is None else count
+        self.progress = Progress(np.zeros(number, dtype=np.int64), np.full(number, -1, dtype=np.int64))
+        self._sides = np.full(number, -1, dtype=np.int64)
+
+    def act(self, observation: Array, members: IndexArray | None = None) -> Actions:
+        """Return actions, members of the action space.
+
+        Args:
+            observation: Observations [B, O], entries of dictionaries one after the other by their names; [O] of a
+                single episode.
+            members: Which episodes they are of [B]; None for all, in order.
+
+        Raises:
+            InvalidOption: another number of observations than of episodes.
+        """
+        observations = np.asarray(observation, dtype=np.float64).reshape(1, -1) if self._single else observation
+        chosen = np.arange(len(self._sides)) if members is None else members
+        if len(observations) != len(chosen):
+            raise InvalidOption(f"got {len(observations)} observations for {len(chosen)} episodes; call reset(count)")
+        shown = observations if self._entries is None else observations[:, self._entries]
+        moved = self.progress[chosen].advanced(self.line, self._view.places(shown), self._view.window)
+        sides = self._view.leading(shown, self.line, moved, self._sides[chosen])
+        self.progress.pointers[chosen], self.progress.stalled[chosen] = moved.pointers, moved.stalled
+        self._sides[chosen] = sides
+        controls = self._view.controls(self._policy.act(self._view.inputs(shown, self.line, moved, sides)), sides)
+        actions = self._actions.to_actions(controls)
+        return actions[0] if self._single else actions
+
+
+@dataclass(frozen=True, eq=False)
+class RobotFollower:
+    """A policy for any line, and what it was trained with.
+
+    Attributes:
+        policy: Of the side that leads.
+        view: What it sees.
+        environment: The robot's.
+        actions: Its action space.
+        spacing: Between the points of lines.
+        clearance: The least distance of lines from walls.
+        training: Plain numbers and settings of the training.
+    """
+
+    policy: Policy
+    view: RobotView
+    environment: EnvSpec
+    actions: ActionMap
+    spacing: float
+    clearance: float
+    training: dict[str, Any]
+
+    def controller(self, line: Line, entries: Sequence[int] | None = None) -> RobotController:
+        """Return the controller for a line.
+
+        Args:
+            line: In the plane of the robot's place, whose points are `spacing` apart; see `Line.through`.
+            entries: The entries of an observation that are the robot's observation, in its order; None for all.
+
+        Raises:
+            InvalidOption: the line is in no plane, or `entries` are of another number.
+        """
+        size = len(self.view.normaliser.origin) + 2
+        if line.points.shape[1] != 2:
+            raise InvalidOption(f"a line in {line.points.shape[1]} dimensions; a robot follows lines in its plane")
+        if entries is not None and len(entries) != size:
+            raise InvalidOption(f"{len(entries)} entries; expected the {size} of the robot's observation")
+        return RobotController(self.policy, self.view, line, self.actions,
+                               None if entries is None else np.array(entries, dtype=np.int64))
+
+    def line_of(self, places: Array) -> Line:
+        """Return the line along the places [T+1, 2] of a plan, without its loops."""
+        return Line.through(places[erase_loops(places, GAP * self.spacing)], self.spacing)
+
+    @checked
+    def save(self, folder: str | Path) -> None:
+        """Write follower.json, with checksums, and follower.safetensors."""
+        folder = Path(folder)
+        save_policies(folder / POLICY, [SkillPolicy(self.policy, self.view.normaliser)])
+        words = {"format": FORMAT, "version": VERSION, "environment": self.environment.to_dict(),
+                 "distances": self.view.distances.tolist(), "window": self.view.window, "patience": self.view.patience,
+                 "spacing": self.spacing, "clearance": self.clearance, "action_shape": list(self.actions.shape),
+                 "training": self.training}
+        words = json.loads(json.dumps(words))
+        write_json(folder / STRUCTURE, {**words, "sha256": {POLICY: _sum(read_bytes(folder / POLICY)),
+                                                            STRUCTURE: _sum(_plain(words))}})
+
+    @classmethod
+    @checked
+    def shipped(cls, name: str) -> "RobotFollower":
+        """Return a follower that comes with the package, such as "ant" (Gymnasium's, trained by `examples`).
+
+        Raises:
+            UnknownName: no such follower; the message suggests the closest one.
+        """
+        known = shipped_followers()
+        if name not in known:
+            raise UnknownName("follower", name, known)
+        return cls.load(known[name])
+
+    @classmethod
+    @checked
+    def load(cls, folder: str | Path, *, trust: bool = False) -> "RobotFollower":
+        """Read a follower that `save` wrote.
+
+        Args:
+            folder: The folder.
+            trust: Let its environment be made where that imports a module which the folder names.
+
+        Raises:
+            DamagedFile: a file is missing, changed, or of another version.
+        """
+        folder = Path(folder)
+        path = folder / STRUCTURE
+        words = read_json(path)
+        if not isinstance(words, dict) or words.get("format") != FORMAT or words.get("version") != VERSION:
+            raise DamagedFile(f"{path} is no robot's follower of version {VERSION}")
+        check(path, words, FollowerWords)
+        sums = words.pop("sha256")
+        (policy,) = load_policies(folder / POLICY, 1)
+        for name, content in ((STRUCTURE, _plain(words)), (POLICY, read_bytes(folder / POLICY))):
+            if sums.get(name) != _sum(content):
+                raise DamagedFile(f"{folder / name} is damaged: its SHA-256 is not the one that {path.name} has")
+        environment = EnvSpec.from_dict(words["environment"], trusted=trust)
+        model = make(environment)
+        view = RobotView(robot_of(model), policy.transform, np.array(words["distances"]), words["window"],
+                         words["patience"])
+        if policy.actor.observation_size != view.size or len(policy.actor.action_low) != len(model.action_low):
+            raise DamagedFile(f"{folder / POLICY} holds a policy of another robot")
+        low, high = policy.actor.action_low, policy.actor.action_high
+        return cls(policy.actor, view, environment, ActionMap(low, high, tuple(words["action_shape"])),
+                   words["spacing"], words["clearance"], words["training"])
+
+
+def shipped_followers() -> dict[str, Path]:
+    """Return the folders of the followers that come with the package, by name."""
+    return {path.parent.name: path.parent for path in sorted(SHIPPED.glob(f"*/{STRUCTURE}"))}
+
+
+def _plain(words: dict[str, Any]) -> bytes:
+    return json.dumps(words, sort_keys=True).encode()
+
+
+def _sum(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,183 @@
+"""Bins and the regions around them at several scales, with the nodes of each bin: the memory of Rides.
+
+A region of scale s is a cube of 2**s bins along each feature; the bins are the regions of scale 0. A region is open
+once a node is in it. All open regions have a number; what is known of each is a row of `rows` (see `ranking`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from pbcs_ompl.core.compiled import njit
+from pbcs_ompl.core.tree import GROWTH, resized_copy
+from pbcs_ompl.planners.kernels.cells import WEIGHT, find_hashed, linear_hash, rehash
+from pbcs_ompl.planners.kernels.ranking import (
+    CHILD,
+    COUNT,
+    FREE_RUN,
+    LENGTH,
+    LOWEST,
+    MISSING,
+    PARENT,
+    REGIONS,
+    RUNS,
+    SIBLING,
+    SIZE,
+    START,
+    enter,
+    lift,
+)
+from pbcs_ompl.planners.kernels.runs import Number, Rows
+from pbcs_ompl.planners.kernels.slices import CLASSES, SMALLEST, USED, double, rows_needed, take
+
+SURROUNDED = 4
+"""How many times a ride counts in a region all of whose neighbours are open."""
+
+
+class Regions(NamedTuple):
+    """The arrays. M rows for regions, S scales, F features, R rows of the pool, H hash cells (a power of two)."""
+
+    rows: Rows
+    """What is known of each region [M, 10]."""
+    cells: NDArray[np.int64]
+    """Integer coordinates of each region, and its scale [M, F + 1]."""
+    table: NDArray[np.int32]
+    """Hash table of region numbers plus one, open addressing, 0 for empty [H]."""
+    order: Rows
+    """The regions of each scale by decreasing key [S, M]."""
+    runs: Rows
+    """Runs of equal keys [M, 5]."""
+    tails: Rows
+    """The lowest run and the number of regions of each scale [S, 2]."""
+    totals: NDArray[np.int64]
+    """Regions and runs ever used, and the first free run [3]."""
+    pool: Rows
+    """The nodes of all bins, in slices [R, 1] (see `slices`)."""
+    free: NDArray[np.int32]
+    used: NDArray[np.int64]
+    cell: NDArray[np.int64]
+    """Where a cell is computed [F + 1]."""
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays; rows that were never written to are not counted."""
+        regions, runs = int(self.totals[REGIONS]), int(self.totals[RUNS])
+        return (self.rows[:regions].nbytes + self.cells[:regions].nbytes + self.table.nbytes + 4 * regions
+                + self.runs[:runs].nbytes + self.pool[:self.used[USED]].nbytes)
+
+
+_rows = types.int32[:, ::1]
+REGIONS_TYPE = types.NamedTuple((_rows, types.int64[:, ::1], types.int32[::1], _rows, _rows, _rows, types.int64[::1],
+                                 _rows, types.int32[::1], types.int64[::1], types.int64[::1]), Regions)
+"""Numba's type of Regions."""
+
+
+def no_regions(num_features: int, scales: int) -> Regions:
+    """Return the arrays without regions; their rows cost no memory until they are written to."""
+    most, pool = 1 << 11, 1 << 14
+    tails = np.zeros((scales, 2), np.int32)
+    tails[:, LOWEST] = -1
+    totals = np.zeros(3, np.int64)
+    totals[FREE_RUN] = -1
+    return Regions(
+        rows=np.empty((most, 10), np.int32), cells=np.empty((most, 1 + num_features), np.int64),
+        table=np.zeros(4 * most, np.int32), order=np.empty((scales, most), np.int32),
+        runs=np.empty((most, 5), np.int32), tails=tails, totals=totals, pool=np.empty((pool, 1), np.int32),
+        free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64),
+        cell=np.zeros(1 + num_features, np.int64))
+
+
+def reserve(regions: Regions, nodes: int) -> Regions:
+    """Return the regions with space for `nodes` more nodes; those that were passed are not to be used any more."""
+    known, scales, size = int(regions.totals[REGIONS]), len(regions.order), len(regions.rows)
+    if known + scales * nodes > size:
+        size = max(GROWTH * size, known + scales * nodes)
+        cells, table = resized_copy(regions.cells, known, size), np.zeros(4 << (size - 1).bit_length(), np.int32)
+        rehash(cells, table, known)
+        order = np.empty((scales, size), np.int32)
+        order[:, :known] = regions.order[:, :known]
+        regions = regions._replace(rows=resized_copy(regions.rows, known, size), cells=cells, table=table, order=order,
+                                   runs=resized_copy(regions.runs, int(regions.totals[RUNS]), size))
+    rows = rows_needed(regions.used, nodes)
+    if rows > len(regions.pool):
+        regions = regions._replace(pool=resized_copy(regions.pool, int(regions.used[USED]),
+                                                     max(GROWTH * len(regions.pool), rows)))
+    return regions
+
+
+@njit(inline="always")
+def key_of(rows: Rows, region: Number) -> Number:
+    """Return by what regions are ranked: the rides begun in it, several times as many once it is surrounded."""
+    count: Number = rows[region, COUNT]
+    return count if rows[region, MISSING] > 0 else SURROUNDED * (count + 1)
+
+
+@njit(inline="always")
+def add_node(rows: Rows, pool: Rows, free: NDArray[np.int32], used: NDArray[np.int64], number: Number,
+             node: Number) -> None:
+    """Add a node to a bin."""
+    length = np.int64(rows[number, LENGTH])
+    if length == 1 << rows[number, SIZE]:
+        size = np.int64(rows[number, SIZE])
+        rows[number, START], rows[number, SIZE] = double(pool, free, used, rows[number, START], size), size + 1
+    pool[rows[number, START] + length, 0] = node
+    rows[number, LENGTH] = length + 1
+
+
+@njit()
+def open_bin(regions: Regions, cell: NDArray[np.int64]) -> Number:
+    """Open the bin of `cell` [F + 1] (overwritten), and the regions around it that are not open; return its number."""
+    rows, cells, table, order, runs, tails, totals, pool, free, used, _ = regions
+    features, opened = len(cell) - 1, np.int64(totals[REGIONS])
+    inner = np.int64(-1)
+    for scale in range(len(order)):
+        cell[features] = scale
+        mixed = linear_hash(cell)
+        place = find_hashed(cells, table, cell, mixed)
+        number = np.int64(table[place]) - 1
+        known = number >= 0
+        if not known:
+            number = np.int64(totals[REGIONS])
+            totals[REGIONS] = number + 1
+            table[place] = number + 1
+            for axis in range(len(cell)):
+                cells[number, axis] = cell[axis]
+            rows[number, PARENT] = rows[number, CHILD] = rows[number, SIBLING] = -1
+            rows[number, COUNT] = rows[number, LENGTH] = 0
+            enter(order, runs, tails, totals, rows, scale, number)
+            _meet_neighbours(rows, cells, table, order, runs, tails, totals, scale, number, cell, mixed)
+        if inner >= 0:
+            rows[inner, PARENT], rows[inner, SIBLING] = number, rows[number, CHILD]
+            rows[number, CHILD] = inner
+        if known:
+            break
+        inner = number
+        for axis in range(features):
+            cell[axis] >>= 1
+    rows[opened, START], rows[opened, SIZE] = take(pool, free, used, SMALLEST), SMALLEST
+    return opened
+
+
+@njit(inline="always")
+def _meet_neighbours(rows: Rows, cells: NDArray[np.int64], table: NDArray[np.int32], order: Rows, runs: Rows,
+                     tails: Rows, totals: NDArray[np.int64], scale: Number, number: Number, cell: NDArray[np.int64],
+                     mixed: np.uint64) -> None:
+    """Count the neighbours of a new region that are not open; those that it surrounds, and itself, rise."""
+    missing, weight = 2 * (len(cell) - 1), WEIGHT
+    for axis in range(len(cell) - 1):
+        for side in (-1, 1):
+            cell[axis] += side
+            place = find_hashed(cells, table, cell, mixed + np.uint64(side) * weight)
+            cell[axis] -= side
+            other = np.int64(table[place]) - 1
+            if other >= 0:
+                missing -= 1
+                rows[other, MISSING] -= 1
+                if rows[other, MISSING] == 0:
+                    lift(order, runs, tails, totals, rows, scale, other, key_of(rows, other))
+        weight *= WEIGHT
+    rows[number, MISSING] = missing
+    if missing == 0:
+        lift(order, runs, tails, totals, rows, scale, number, key_of(rows, number))
