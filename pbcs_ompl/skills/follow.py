@@ -250,7 +250,7 @@ class Follow:
     def _split(self) -> None:
         """Try the best policy from the candidate on; keep it from there, or move on to beyond its failures."""
         state = self.state
-        if self.best is None or state.candidate >= min(state.end, self.task.line.last):
+        if self.best is None or state.candidate >= min(state.end, int(self.task.pointers[-1])):
             self.members = []
             self._begin_again(self.task.line.last + 1)
             return

@@ -96,7 +96,7 @@ class FollowTask:
 
     Attributes:
         model: The environment.
-        line: Through the features of the plan without its loops, in steps.
+        line: Through the features of the plan without its loops, and a little beyond its end, in steps.
         view: What policies see.
         states: The states of the plan [T+1, D].
         pointers: Where they are on the line [T+1]; those of a loop are where it begins.
@@ -129,7 +129,7 @@ class FollowTask:
         unit = np.where(steps > 0, steps, 1.0)
         kept = erase_loops(features / unit, 1.0)
         corners = features[kept] / unit
-        line = Line.through(corners, settings.spacing)
+        line = Line.through(extended(corners, settings.look_ahead * max(LOOKS)), settings.spacing)
         hop = np.searchsorted(kept, np.arange(len(states)), side="right") - 1
         deviation = observations.std(axis=0)
         normaliser = ObservationTransform(observations.mean(axis=0), np.where(deviation > 1e-9, deviation, 1.0))
@@ -190,6 +190,16 @@ class FollowTask:
             if not len(alive):
                 break
         return Tries(success, pointers)
+
+
+def extended(corners: Array, length: float) -> Array:
+    """Return corners [N, F] and one more, further in the direction of the last hop: a policy need not stop at the end.
+
+    A plan ends where it enters the goal, so that way leads into it.
+    """
+    hop = corners[-1] - corners[-2]
+    size = float(np.linalg.norm(hop))
+    return np.concatenate([corners, (corners[-1] + hop * (length / size))[None]]) if size > 0 else corners
 
 
 def feature_entries(model: ResettableModel, states: Array, observations: Array) -> IndexArray:

@@ -19,7 +19,7 @@ class SequentialTest(Settings):
 
     Attributes:
         refused_rate: p0 (ours: what counts as solved, see `CriterionSettings.robust_rate`).
-        accepted_rate: p1 (ours: a policy of this rate fails 95 of 100 in about one case of 300).
+        accepted_rate: p1 (ours: a policy of this rate fails 95 of 100 in one case of thousands).
         false_acceptances: Chance to accept p0 (ours, not tuned).
         false_refusals: Chance to refuse p1 (ours, not tuned).
         most_trials: Trials after which the sign decides, so that rates in between do not cost more (ours).
@@ -27,7 +27,7 @@ class SequentialTest(Settings):
     Source: A. Wald, Sequential Tests of Statistical Hypotheses, 1945.
     """
 
-    refused_rate: float = 0.93
+    refused_rate: float = 0.95
     accepted_rate: float = 0.995
     false_acceptances: float = 0.05
     false_refusals: float = 0.05

@@ -1,5 +1,6 @@
 """Path following: it solves a maze, resumes bit for bit, splits where a policy fails, and refuses what it cannot do."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import pytest
 
 import pbcs_ompl
 from pbcs_ompl.bridge.trajectory import Trajectory
+from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, InvalidState, Mismatch
 from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
@@ -16,7 +18,7 @@ from pbcs_ompl.skills import load_chain, method_settings
 from pbcs_ompl.skills.agent_interface import load_agent
 from pbcs_ompl.skills.follow import Follow, FollowSettings, Verdict
 from pbcs_ompl.skills.follow_chain import FollowChain
-from pbcs_ompl.skills.follow_task import FollowTask, LineSettings
+from pbcs_ompl.skills.follow_task import FollowTask, LineSettings, extended
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
@@ -61,6 +63,17 @@ def test_a_saved_follower_acts_as_the_one_that_was_saved(folder: Path, tmp_path:
         found = pbcs_ompl.evaluate(chain, episodes=20, epsilon=0.1)
         assert found.success_rate >= 0.9
     np.testing.assert_array_equal(loaded.rollout(MODEL), FollowChain.load(tmp_path / "again").rollout(MODEL))
+
+
+def test_the_commands_take_it_as_they_take_a_chain(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                   capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    train = ["train", "--method", "follow", "--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 2}', "--out", "run"]
+    assert main(train) == 0
+    assert (tmp_path / "run" / "chain.png").stat().st_size > 5000
+    assert main(["eval", "run", "--epsilon", "0.1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.strip().splitlines()[-1])["success_rate"] > 0.9
+    assert main(["report", "run"]) == 0
 
 
 def test_a_changed_follower_is_found_and_one_method_reads_not_the_other(folder: Path, tmp_path: Path) -> None:
@@ -164,7 +177,9 @@ def test_starts_lie_all_along_the_plan_before_the_end(plan: Trajectory) -> None:
 def test_the_line_is_in_steps_of_the_plan_and_policies_see_it_in_the_observation(plan: Trajectory) -> None:
     task = FollowTask.of(MODEL, plan.states, LineSettings())
     np.testing.assert_allclose(task.line.points[0] * task.view.unit, plan.states[0])
-    np.testing.assert_allclose(task.line.points[-1] * task.view.unit, plan.states[-1])
+    end = task.line.points[task.pointers[-1]]
+    np.testing.assert_allclose(end * task.view.unit, plan.states[-1], atol=0.5 * task.line.spacing * 0.1)
+    assert (task.line.last - task.pointers[-1]) * task.line.spacing == pytest.approx(4.0, abs=0.5)
     assert (np.diff(task.pointers) >= 0).all()
     assert task.hops < plan.length
     position = task.at(np.arange(plan.length))
@@ -175,6 +190,13 @@ def test_the_line_is_in_steps_of_the_plan_and_policies_see_it_in_the_observation
     tail = task.line.ahead(task.view.features(position.observations), np.full(plan.length, task.line.last),
                            task.view.distances)
     np.testing.assert_array_equal(tail[:, 0], tail[:, 2])
+
+
+def test_a_line_continues_in_the_direction_in_which_the_plan_ends() -> None:
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.5]])
+    np.testing.assert_allclose(extended(corners, 4.0), [*corners, [1.0, 4.5]])
+    still = np.zeros((2, 2))
+    np.testing.assert_array_equal(extended(still, 4.0), still)
 
 
 def test_a_feature_that_is_not_observed_is_refused() -> None:
