@@ -12,6 +12,8 @@ from pbcs_ompl.skills import resume_follower, train_follower
 
 TRAINING = {"integrator": "Euler", "terminate_when_unhealthy": True, "terminate_on_success": False, "threads": 1}
 WORLDS = [*[{"map": "open", "size": 8}] * 4, *[{"size": 4 + k % 2, "maze_seed": 100 + k} for k in range(12)]]
+TRANSITIONS = 1_937_171
+"""Those of the follower that ships; a larger budget continues its training."""
 
 
 def main(out: str, transitions: int) -> None:
@@ -26,4 +28,4 @@ def main(out: str, transitions: int) -> None:
 
 if __name__ == "__main__":
     given = sys.argv[1:]
-    main(given[0] if given else "runs/ant-follower", int(given[1]) if len(given) > 1 else 2_800_000)
+    main(given[0] if given else "runs/ant-follower", int(given[1]) if len(given) > 1 else TRANSITIONS)

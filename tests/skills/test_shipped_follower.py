@@ -1,0 +1,44 @@
+"""The follower that comes with the package drives in mazes that it never saw, without training there."""
+
+import json
+
+import pytest
+
+import pbcs_ompl
+from pbcs_ompl.cli import main
+from pbcs_ompl.core.errors import UnknownName
+from pbcs_ompl.skills import RobotFollower, evaluate_follower
+
+pytest.importorskip("mujoco")
+
+
+@pytest.fixture(scope="module")
+def ant() -> RobotFollower:
+    return RobotFollower.shipped("ant")
+
+
+@pytest.mark.parametrize("options", [{}, {"size": 4, "maze_seed": 503}, {"map": "umaze", "goal_radius": 0.45}])
+def test_the_ant_walks_to_the_goal(ant: RobotFollower, options: dict) -> None:
+    found = evaluate_follower(ant, "pbcs/AntMaze-v0", env_kwargs={**options, "threads": 1}, episodes=4)
+    assert found.successes >= 3, found
+
+
+def test_its_training_is_recorded_and_none_of_its_worlds_is_in_the_tables(ant: RobotFollower) -> None:
+    training = ant.training
+    assert training["transitions"] > 500_000
+    assert training["settings"]["patience"] == 30
+    assert {world.get("maze_seed", 0) for world in training["worlds"]} <= {0, *range(100, 112)}
+    assert training["versions"]["mujoco"]
+
+
+def test_the_command_line_knows_it_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["eval", "ant", "--env", "pbcs/AntMaze-v0", "--episodes", "2", "--json"]
+    assert main(words) == 0
+    assert json.loads(capsys.readouterr().out)["episodes"] == 2
+
+
+def test_unknown_names_and_other_robots_are_refused(ant: RobotFollower) -> None:
+    with pytest.raises(UnknownName, match="'ant'"):
+        RobotFollower.shipped("aunt")
+    with pytest.raises(pbcs_ompl.core.errors.Mismatch, match="observations or actions differ"):
+        evaluate_follower(ant, "pbcs/AntMaze-v0", env_kwargs={"ant": "d4rl"})
