@@ -3,6 +3,9 @@
 import os
 import warnings
 from collections.abc import Callable
+from functools import cache
+from hashlib import blake2b
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -15,7 +18,9 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def njit(*signature: Any, **options: Any) -> Callable[[Function], Function]:
     """Return a decorator that compiles without Python and caches the machine code.
 
-    Numba caches beside the source, else in the home of the user. Where it can write in neither (a read-only
+    Numba looks for a newer version only in the file of the function, not in those of the kernels that it calls, so the
+    names of cached files have a digest of all of them. It caches beside the source, else in the home of the user. Where
+    it can write in neither (a read-only
     installation without a home), it raises when the function is defined; then a temporary folder takes their place, and
     where there is none of these either, the function is compiled in each process.
 
@@ -27,8 +32,7 @@ def njit(*signature: Any, **options: Any) -> Callable[[Function], Function]:
         for places in (_usual, _temporary):
             try:
                 places()
-                compiled: Function = numba.njit(*signature, cache=True, **options)(function)
-                return compiled
+                return _cached(function, *signature, **options)
             except (RuntimeError, OSError) as error:
                 if isinstance(error, RuntimeError) and "cannot cache" not in str(error):
                     raise
@@ -36,6 +40,38 @@ def njit(*signature: Any, **options: Any) -> Callable[[Function], Function]:
         return uncached
 
     return decorate
+
+
+def _cached(function: Function, *signature: Any, **options: Any) -> Function:
+    """Compile with a cache; Numba makes the names of its files of the function's name when it is defined."""
+    name = function.__qualname__
+    function.__qualname__ = f"{name}-{kernel_digest()}"
+    try:
+        compiled: Function = numba.njit(*signature, cache=True, **options)(function)
+    finally:
+        function.__qualname__ = name
+    return compiled
+
+
+def kernel_files() -> list[Path]:
+    """Return the sources of the kernels that others call: all in folders or files called `kernels` or `compiled`."""
+    root = Path(__file__).parents[1]
+    found = []
+    for place, folders, names in os.walk(root, followlinks=True):  # planners and envs are links in a checkout
+        folders[:] = sorted(folder for folder in folders if folder != "__pycache__")
+        for name in sorted(names):
+            if name.endswith(".py") and ("kernels" in name or name == "compiled.py" or Path(place).name == "kernels"):
+                found.append(Path(place) / name)
+    return found
+
+
+@cache
+def kernel_digest() -> str:
+    """Return a digest of the sources of all kernels."""
+    digest = blake2b(digest_size=6)
+    for path in kernel_files():
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 def _usual() -> None:
