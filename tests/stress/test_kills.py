@@ -150,7 +150,7 @@ def prepare(verb, folder):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1800)
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("verb", KILLS)
 def test_what_was_killed_ends_as_if_it_had_not_been(tmp_path, verb):
     prepare(verb, tmp_path)

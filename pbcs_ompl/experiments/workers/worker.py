@@ -180,20 +180,21 @@ def worker_main(connection: Connection) -> None:
     end_with_parent()
     for number in STOPPING:
         signal.signal(number, signal.SIG_IGN)  # they are for the parent, which ends its workers
+    with suppress(EOFError, ConnectionError):  # closed, or closed while the parent was stopped
+        _serve(connection)
+
+
+def _serve(connection: Connection) -> None:
     try:
         function = connection.recv()
-    except (EOFError, ConnectionError):  # closed, or closed while the parent was stopped
-        return
+    except (EOFError, ConnectionError):
+        raise
     except (Exception, SystemExit) as error:
         connection.send(describe(error))
         return
     connection.send(READY)
     while True:
-        try:
-            run = connection.recv()
-            connection.send(_found(function, run))
-        except (EOFError, ConnectionError):
-            return
+        connection.send(_found(function, connection.recv()))
 
 
 def _found(function: RunFunction, run: Run) -> Record | Failure:

@@ -157,18 +157,23 @@ def test_limits_that_cannot_be_are_named(make, message):
         make()
 
 
-@pytest.mark.parametrize("received", [0, 1])
-def test_a_parent_that_hangs_up_ends_a_worker_quietly(monkeypatch, received):
+@pytest.mark.parametrize("messages", [0, 1, 2, 3])
+def test_a_parent_that_hangs_up_ends_a_worker_quietly(monkeypatch, messages):
+    """After so many messages: the function, that it is ready, a run, its record."""
     class HungUp:
-        messages = [do]  # noqa: RUF012 - of one test
+        left = messages
 
         def recv(self):
-            if received and self.messages:
-                return self.messages.pop()
-            raise ConnectionResetError
+            self.count()
+            return do
 
         def send(self, message):
-            """Take no note of it."""
+            self.count()
+
+        def count(self):
+            self.left -= 1
+            if self.left < 0:
+                raise ConnectionResetError
 
     monkeypatch.setattr(worker, "end_with_parent", lambda: None)
     monkeypatch.setattr(worker.signal, "signal", lambda *_: None)
