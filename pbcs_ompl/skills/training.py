@@ -18,6 +18,7 @@ from pbcs_ompl.core.errors import BudgetUsedUp, Mismatch, NotVerified
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.signals import interruptible
+from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.core.types import Array, Counter, ProgressCallback
 from pbcs_ompl.resettable.task import Task
 from pbcs_ompl.results.checksums import write_summed_json
@@ -291,7 +292,7 @@ class Training:
         believed = chain.rollouts(self.model, starts, epsilon=criterion.robust_epsilon,
                                   rng=self.seeds.child("model evaluation").generator())
         rate = float(believed.success.mean())
-        return _Outcome(_failure(nominal, robust, rate, criterion), nominal, robust, rate)
+        return _Outcome(failure(nominal, robust, rate, criterion), nominal, robust, rate)
 
     def _write(self, result: TrainResult) -> None:
         if self.folder is None:
@@ -335,7 +336,7 @@ class _Outcome(NamedTuple):
     model_success_rate: float | None
 
 
-def _failure(nominal: Evaluation, robust: Evaluation, believed: float, criterion: CriterionSettings) -> str | None:
+def failure(nominal: Evaluation, robust: Evaluation, believed: float, criterion: CriterionSettings) -> str | None:
     """Return why a complete training does not meet the criterion of a solved one; None when it does."""
     if nominal.success_rate == 1 and robust.success_rate >= criterion.robust_rate:
         return None
@@ -345,7 +346,7 @@ def _failure(nominal: Evaluation, robust: Evaluation, believed: float, criterion
     else:
         found = (f"{robust.successes} of {robust.episodes} executions with {robust.epsilon:.0%} random actions "
                  f"succeed, expected {criterion.robust_rate:.0%}")
-    if robust.wilson[1] < believed:
+    if robust.wilson[1] < wilson(round(believed * robust.episodes), robust.episodes)[0]:  # both are samples
         found += (f"; in the model that it was trained in {believed:.0%} succeed, so the model is not true to the "
                   f"environment: run pbcs doctor")
     return found

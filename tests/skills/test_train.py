@@ -18,10 +18,13 @@ from pbcs_ompl.core.errors import (
     RunFolderError,
     UnknownName,
 )
+from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.files import read_toml
-from pbcs_ompl.skills import SkillChain, resume, train
+from pbcs_ompl.skills import Evaluation, SkillChain, resume, train
 from pbcs_ompl.skills.policy import policy_to_arrays
+from pbcs_ompl.skills.settings import CriterionSettings
+from pbcs_ompl.skills.training import failure
 
 MAZE = {"size": 2}
 
@@ -256,3 +259,13 @@ def test_pbcs_solves_every_small_maze(size, record_property):
     # Seed 5 of size 4 has 94 of 100. In 5,000 executions its chain succeeds in 97.7 % [97.2, 98.0], less than the
     # 98.5 % that it was verified at; a chain of that rate misses 95 of 100 with a probability of 3 %.
     assert solved >= seeds - 1
+
+
+@pytest.mark.parametrize(("successes", "believed", "untrue"), [(94, 0.98, False), (90, 1.0, True), (50, 0.98, True)])
+def test_a_model_is_called_untrue_only_where_both_samples_say_so(successes, believed, untrue):
+    nominal = Evaluation(1.0, wilson(1, 1), 1, 20.0, 0.0, {"goal": 1})
+    robust = Evaluation(successes / 100, wilson(successes, 100), 100, 20.0, 0.1, {"goal": successes})
+    reason = failure(nominal, robust, believed, CriterionSettings())
+    assert reason is not None
+    assert reason.startswith(f"{successes} of 100 executions with 10% random actions succeed, expected 95%")
+    assert ("not true" in reason) == untrue
