@@ -73,7 +73,10 @@ def _replays_at_once(trajectory: Trajectory, model: ResettableModel, execution: 
     if not isinstance(model, VectorisedModel) or seen is None or len(seen) != len(trajectory.states):
         return False
     states = trajectory.states
-    after = model.transition(states[:-1], trajectory.controls).states
+    try:
+        after = model.transition(states[:-1], trajectory.controls).states
+    except Exception:  # of the environment; the replay step by step finds and names it
+        return False
     return (model.initial_state(trajectory.reset_seed).tobytes() == states[0].tobytes()
             and after.tobytes() == states[1:].tobytes() and bool(np.array_equal(model.observe(states), seen)))
 

@@ -188,12 +188,28 @@ class RobotTraining:
         walks.steps[members], walks.marked_at[members] = 0, -1
         return self._inputs(fresh)
 
-    def test(self) -> float:
-        """Return the fraction of the test lines to whose end the policy leads without noise; keep the best policy."""
+    @property
+    def iteration_transitions(self) -> int:
+        """Environment steps of an iteration."""
+        return self.settings.robots * self.settings.horizon
+
+    @property
+    def longest_test(self) -> int:
+        """The most environment steps of a test."""
+        return (len(self.worlds.world_of) - self.worlds.num_training) * self.settings.test_steps
+
+    def test(self, most_transitions: int) -> float:
+        """Return the fraction of the test lines to whose end the policy leads without noise; keep the best policy.
+
+        Args:
+            most_transitions: Those of the training beyond which no step is made; walks that are on the way then failed.
+        """
         policy = self.agent.policy()
         walks = self._begin(self.starts.tests(self.seeds.child("test").generator()))
         count, reached = len(walks.rows), 0
         for _ in range(self.settings.test_steps):
+            if self.transitions + len(walks.rows) > most_transitions:
+                break
             actions = policy.act(self._inputs(walks))
             _, success, fallen, ended = self._advance(walks, self.view.controls(actions, walks.sides))
             reached += int(success.sum())

@@ -74,7 +74,7 @@ def train_follower(env: str | EnvSpec, *, env_kwargs: dict[str, Any] | None = No
         settings: Settings that differ from those of `RobotSettings`, by name or path.
         agent_settings: Settings that differ from those of `PPOSettings`.
         seed: Root of all random streams; equal seeds give equal results.
-        max_transitions: Budget of environment steps; the last iteration and test may exceed it.
+        max_transitions: Budget of environment steps, those of tests included; the last test is cut off at it.
         out: A new folder for config.toml, result.json, follower/ and, until the end, checkpoint.npz.
         on_progress: Called after every iteration with plain numbers.
 
@@ -156,6 +156,10 @@ class _Run:
         """Train until the budget is used up; write checkpoints and the result."""
         with one_thread(), code_of_others("the environment"):
             training = training or self.training()
+            least = training.transitions + training.iteration_transitions
+            if self.max_transitions < least:
+                raise InvalidOption(f"max_transitions={self.max_transitions}; expected at least {least}, for the "
+                                    "bodies that episodes begin with and one iteration")
             seconds = 0.0
             if folder is not None and not resumed:
                 folder.write_config({"kind": "follower", "environment": self.spec.to_dict(), "seed": self.seed,
@@ -172,10 +176,13 @@ class _Run:
         path = None if folder is None else folder.path
         saved = time.perf_counter()
         with interruptible(stops.append):
-            while training.transitions < self.max_transitions:
-                numbers = training.iterate()
+            while training.transitions + training.iteration_transitions <= self.max_transitions:
                 if training.transitions >= training.next_test:
-                    training.test()
+                    if training.transitions + training.longest_test > self.max_transitions:
+                        break  # a test that the budget cuts off is the last one
+                    training.test(self.max_transitions)
+                    continue
+                numbers = training.iterate()
                 if path is not None and (stops or time.perf_counter() - saved > CHECKPOINT_SECONDS):
                     _checkpoint(training, path / CHECKPOINT, time.perf_counter() - began)
                     saved = time.perf_counter()
@@ -185,7 +192,7 @@ class _Run:
                     self.on_progress({"phase": "train", **numbers})
         if path is not None:  # before the last test, which a training with a larger budget does not make
             _checkpoint(training, path / CHECKPOINT, time.perf_counter() - began)
-        training.test()
+        training.test(self.max_transitions)
         return self._finish(training, folder, time.perf_counter() - began)
 
     def _finish(self, training: RobotTraining, folder: RunFolder | None, seconds: float) -> FollowerResult:

@@ -9,6 +9,16 @@ import pytest
 from pbcs_ompl.core.signals import STOPPING, interruptible, signal_of, signals_interrupt, with_remedy
 
 
+@pytest.fixture(autouse=True)
+def usual_handlers():
+    """Set the handlers of a process that was started from a terminal; `nohup` leaves another one."""
+    usual = {number: signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+             for number in STOPPING}
+    yield
+    for number, handler in usual.items():
+        signal.signal(number, handler)
+
+
 @pytest.mark.parametrize("number", STOPPING)
 def test_the_first_signal_is_noted_and_the_second_raises(number):
     seen = []

@@ -174,9 +174,9 @@ def test_the_command_line_trains_and_evaluates(tmp_path: Path, capsys: pytest.Ca
     settings = json.dumps(POINT | {"test_transitions": 8000, "lines_per_world": 5})
     train = ["train", "--method", "follow", "--lines", "random", "--env", "pbcs/Maze-v0"]
     assert main([*train, "--env-kwargs", '{"size": 3}', "--settings", settings, "--agent-settings",
-                 json.dumps(AGENT), "--max-transitions", "12000", "--out", out, "--json"]) == 0
+                 json.dumps(AGENT), "--max-transitions", "19000", "--out", out, "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
-    assert summary["transitions"] >= 12_000
+    assert 18_000 < summary["transitions"] <= 19_000
     assert main(["eval", out, "--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 3}', "--episodes", "3",
                  "--json"]) in (0, 1)
     assert json.loads(capsys.readouterr().out)["episodes"] == 3
@@ -228,3 +228,11 @@ def test_the_side_that_looks_along_the_line_leads_and_keeps_leading(ant_view: Ro
     np.testing.assert_array_equal(np.array(kept) == 0, angles <= KEEP_SIDE + 1e-9)
     controls = ant_view.controls(np.arange(8.0)[None], np.array([2]))
     np.testing.assert_array_equal(np.sort(np.abs(controls[0])), np.arange(8.0))
+
+
+@pytest.mark.parametrize("budget", [25_000, 31_000])
+def test_the_budget_binds(budget: int) -> None:
+    arguments = {"worlds": WORLDS[:1], "settings": POINT | {"test_transitions": 8000}, "agent_settings": AGENT}
+    with pytest.raises(InvalidOption, match="expected at least"):
+        train_follower("pbcs/Maze-v0", **arguments, max_transitions=100)
+    assert budget - 5_000 < train_follower("pbcs/Maze-v0", **arguments, max_transitions=budget).transitions <= budget
