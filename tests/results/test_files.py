@@ -56,7 +56,15 @@ def test_toml_leaves_none_out_and_takes_numpy():
 @given(nested(st.none() | scalars))
 def test_json_round_trip(tmp_path, value):
     write_json(tmp_path / "x.json", value)
-    assert read_json(tmp_path / "x.json") == value
+    assert read_json(tmp_path / "x.json", finite=False) == value
+
+
+@pytest.mark.parametrize("value", [float("inf"), [1.0, float("-inf")], {"a": float("nan")}])
+def test_numbers_that_are_not_finite_are_read_only_where_that_is_meant(tmp_path, value):
+    write_json(tmp_path / "x.json", value)
+    with pytest.raises(DamagedFile, match="expected a finite number"):
+        read_json(tmp_path / "x.json")
+    assert repr(read_json(tmp_path / "x.json", finite=False)) == repr(value)
 
 
 def test_json_takes_numpy_and_refuses_what_it_does_not_know(tmp_path):

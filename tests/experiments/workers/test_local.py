@@ -159,7 +159,7 @@ def test_limits_that_cannot_be_are_named(make, message):
 
 @pytest.mark.parametrize("messages", [0, 1, 2, 3])
 def test_a_parent_that_hangs_up_ends_a_worker_quietly(monkeypatch, messages):
-    """After so many messages: the function, that it is ready, a run, its record."""
+    """After this number of messages: the function, that it is ready, a run, its record."""
     class HungUp:
         left = messages
 
