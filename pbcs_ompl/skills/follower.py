@@ -12,6 +12,7 @@ from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable.actions import ActionMap, Actions
 from pbcs_ompl.skills.line import Line
 from pbcs_ompl.skills.policy import ObservationTransform
+from pbcs_ompl.skills.side_by_side import SideBySide
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +123,7 @@ class Relay:
         return self._stack.act(inputs, self.index(pointers))
 
 
-class Follower:
+class Follower(SideBySide):
     """Drives along a line: a pointer for each episode moves forward on it, and a policy sees where the line leads.
 
     Where one policy does not lead to the end, others take over at fixed places of the line.
@@ -153,34 +154,16 @@ class Follower:
         self.line = line
         self.reset()
 
-    def reset(self, count: int | None = None) -> None:
-        """Begin `count` episodes side by side; None for one, whose observations are vectors and not batches."""
-        self._single = count is None
-        self.progress = Progress(np.zeros(1 if count is None else count, dtype=np.int64),
-                                 np.full(1 if count is None else count, -1))
+    def _begin(self, count: int) -> None:
+        self.progress = Progress(np.zeros(count, dtype=np.int64), np.full(count, -1))
 
     @property
     def current(self) -> IndexArray:
         """The index of the policy that acts in each episode [B]."""
         return self._relay.index(self.progress.pointers)
 
-    def act(self, observation: Array, members: IndexArray | None = None) -> Actions:
-        """Return actions, members of the action space.
-
-        Args:
-            observation: Observations [B, O], entries of dictionaries one after the other by their names; [O] of a
-                single episode.
-            members: Which episodes they are of [B]; None for all, in order.
-
-        Raises:
-            InvalidOption: another number of observations than of episodes.
-        """
-        observations = np.asarray(observation, dtype=np.float64).reshape(1, -1) if self._single else observation
-        chosen = np.arange(len(self.progress.pointers)) if members is None else members
-        if len(observations) != len(chosen):
-            raise InvalidOption(f"got {len(observations)} observations for {len(chosen)} episodes; call reset(count)")
-        moved = self.progress[chosen].advanced(self.line, self._view.features(observations), self._view.window)
-        self.progress.pointers[chosen], self.progress.stalled[chosen] = moved.pointers, moved.stalled
+    def _act(self, observations: Array, members: IndexArray) -> Actions:
+        moved = self.progress[members].advanced(self.line, self._view.features(observations), self._view.window)
+        self.progress.pointers[members], self.progress.stalled[members] = moved.pointers, moved.stalled
         inputs = self._view.inputs(observations, self.line, moved)
-        actions = self._actions.to_actions(self._relay.act(inputs, moved.pointers))
-        return actions[0] if self._single else actions
+        return self._actions.to_actions(self._relay.act(inputs, moved.pointers))

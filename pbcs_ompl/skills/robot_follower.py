@@ -23,6 +23,7 @@ from pbcs_ompl.skills.line import Line, erase_loops
 from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
 from pbcs_ompl.skills.robot_view import RobotView
 from pbcs_ompl.skills.robot_worlds import robot_of
+from pbcs_ompl.skills.side_by_side import SideBySide
 
 STRUCTURE, POLICY = "follower.json", "follower.safetensors"
 FORMAT, VERSION = "pbcs_ompl robot follower", 1
@@ -45,7 +46,7 @@ class FollowerWords(TypedDict):
     sha256: dict[str, str]
 
 
-class RobotController:
+class RobotController(SideBySide):
     """Drives episodes along one line: a pointer for each of them moves forward on it.
 
     Attributes:
@@ -65,35 +66,18 @@ class RobotController:
         self.line = line
         self.reset()
 
-    def reset(self, count: int | None = None) -> None:
-        """Begin `count` episodes side by side; None for one, whose observations are vectors and not batches."""
-        self._single, number = count is None, 1 if count is None else count
-        self.progress = Progress(np.zeros(number, dtype=np.int64), np.full(number, -1, dtype=np.int64))
-        self._sides = np.full(number, -1, dtype=np.int64)
+    def _begin(self, count: int) -> None:
+        self.progress = Progress(np.zeros(count, dtype=np.int64), np.full(count, -1, dtype=np.int64))
+        self._sides = np.full(count, -1, dtype=np.int64)
 
-    def act(self, observation: Array, members: IndexArray | None = None) -> Actions:
-        """Return actions, members of the action space.
-
-        Args:
-            observation: Observations [B, O], entries of dictionaries one after the other by their names; [O] of a
-                single episode.
-            members: Which episodes they are of [B]; None for all, in order.
-
-        Raises:
-            InvalidOption: another number of observations than of episodes.
-        """
-        observations = np.asarray(observation, dtype=np.float64).reshape(1, -1) if self._single else observation
-        chosen = np.arange(len(self._sides)) if members is None else members
-        if len(observations) != len(chosen):
-            raise InvalidOption(f"got {len(observations)} observations for {len(chosen)} episodes; call reset(count)")
+    def _act(self, observations: Array, members: IndexArray) -> Actions:
         shown = observations if self._entries is None else observations[:, self._entries]
-        moved = self.progress[chosen].advanced(self.line, self._view.places(shown), self._view.window)
-        sides = self._view.leading(shown, self.line, moved, self._sides[chosen])
-        self.progress.pointers[chosen], self.progress.stalled[chosen] = moved.pointers, moved.stalled
-        self._sides[chosen] = sides
+        moved = self.progress[members].advanced(self.line, self._view.places(shown), self._view.window)
+        sides = self._view.leading(shown, self.line, moved, self._sides[members])
+        self.progress.pointers[members], self.progress.stalled[members] = moved.pointers, moved.stalled
+        self._sides[members] = sides
         controls = self._view.controls(self._policy.act(self._view.inputs(shown, self.line, moved, sides)), sides)
-        actions = self._actions.to_actions(controls)
-        return actions[0] if self._single else actions
+        return self._actions.to_actions(controls)
 
 
 @dataclass(frozen=True, eq=False)
