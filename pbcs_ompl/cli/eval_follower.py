@@ -8,8 +8,8 @@ from pbcs_ompl.cli.terminal import print_summary
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.formatting import format_number, format_rate
 from pbcs_ompl.results.files import FOLLOWER, TRAJECTORY
-from pbcs_ompl.skills.follower_evaluation import evaluate_follower
-from pbcs_ompl.skills.robot_follower import STRUCTURE, RobotFollower, shipped_followers
+from pbcs_ompl.skills.robots.evaluation import evaluate_follower
+from pbcs_ompl.skills.robots.follower import STRUCTURE, RobotFollower, shipped_followers
 
 
 def follower_folder(folder: Path) -> Path | None:

@@ -11,7 +11,7 @@ from pbcs_ompl.core.formatting import format_duration, format_number
 from pbcs_ompl.core.signals import with_remedy
 from pbcs_ompl.results.command_line import command, resume_words
 from pbcs_ompl.results.files import CONFIG
-from pbcs_ompl.skills.train_follower import FollowerResult, resume_follower, train_follower
+from pbcs_ompl.skills.robots.train import FollowerResult, resume_follower, train_follower
 
 FIXED: dict[str, Any] = {
     "path": None, "planner": None, "planner_kwargs": {}, "goal": None, "feature": None, "start_seed": None,

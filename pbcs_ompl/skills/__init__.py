@@ -3,12 +3,12 @@
 from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.config import TrainConfig, method_settings
 from pbcs_ompl.skills.evaluation import Evaluation, evaluate
-from pbcs_ompl.skills.follower_evaluation import evaluate_follower
 from pbcs_ompl.skills.load_chain import load_chain
-from pbcs_ompl.skills.robot_follower import RobotFollower
+from pbcs_ompl.skills.robots.evaluation import evaluate_follower
+from pbcs_ompl.skills.robots.follower import RobotFollower
+from pbcs_ompl.skills.robots.train import FollowerResult, resume_follower, train_follower
 from pbcs_ompl.skills.settings import MethodSettings, preset_names
 from pbcs_ompl.skills.train import resume, train
-from pbcs_ompl.skills.train_follower import FollowerResult, resume_follower, train_follower
 from pbcs_ompl.skills.training import TrainResult
 
 __all__ = ["Evaluation", "FollowerResult", "MethodSettings", "RobotFollower", "Skill", "SkillChain", "TrainConfig",

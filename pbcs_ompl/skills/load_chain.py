@@ -3,11 +3,12 @@
 from pathlib import Path
 
 from pbcs_ompl.core.checked import checked
-from pbcs_ompl.skills import chain, follow_chain
+from pbcs_ompl.skills import chain
 from pbcs_ompl.skills.chain_files import kind_in
+from pbcs_ompl.skills.path_following import chain as followed
 from pbcs_ompl.skills.trained_controller import TrainedController
 
-LOADERS = {chain.KIND: chain.SkillChain.load, follow_chain.KIND: follow_chain.FollowChain.load}
+LOADERS = {chain.KIND: chain.SkillChain.load, followed.KIND: followed.FollowChain.load}
 
 
 @checked

@@ -7,7 +7,7 @@ import numpy as np
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, Counter, IndexArray
 from pbcs_ompl.skills.activation_sets import Ball, EnvironmentGoal, Target
-from pbcs_ompl.skills.line import fewest_hops
+from pbcs_ompl.skills.path_following.line import fewest_hops
 from pbcs_ompl.skills.policy import ObservationTransform
 from pbcs_ompl.skills.settings import PlannedSettings, PlanSettings, StartSettings
 

@@ -18,9 +18,9 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.envs.maze_maps import MazeMap
 from pbcs_ompl.skills import RobotFollower
-from pbcs_ompl.skills.follower_evaluation import drive, planned_line, shortest_line
-from pbcs_ompl.skills.free_space import FreeSpace
-from pbcs_ompl.skills.line import Line
+from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.robots.evaluation import drive, planned_line, shortest_line
+from pbcs_ompl.skills.robots.free_space import FreeSpace
 
 CELL = 4.0
 OFFICIAL = {"umaze": "AntMaze_UMaze-v5", "medium": "AntMaze_Medium-v5", "large": "AntMaze_Large-v5"}

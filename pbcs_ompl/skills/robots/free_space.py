@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.skills.line import Line, erase_loops
+from pbcs_ompl.skills.path_following.line import Line, erase_loops
 
 CELLS = 3.0
 """Grid cells in the clearance of a line."""

@@ -10,7 +10,7 @@ from pbcs_ompl.agents.policy import Policy, PolicyStack
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable.actions import ActionMap, Actions
-from pbcs_ompl.skills.line import Line
+from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.policy import ObservationTransform
 from pbcs_ompl.skills.side_by_side import SideBySide
 

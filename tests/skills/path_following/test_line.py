@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.skills.line import Line, arc_lengths, erase_loops
+from pbcs_ompl.skills.path_following.line import Line, arc_lengths, erase_loops
 
 CORNERS = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]])
 

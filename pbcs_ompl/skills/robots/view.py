@@ -6,10 +6,10 @@ import numpy as np
 
 from pbcs_ompl.core.robot import Robot
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.skills.follower import Progress
-from pbcs_ompl.skills.line import Line
-from pbcs_ompl.skills.lines import Lines
+from pbcs_ompl.skills.path_following.follower import Progress
+from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.policy import ObservationTransform
+from pbcs_ompl.skills.robots.lines import Lines
 
 KEEP_SIDE = np.pi / 3
 """A side leads as long as the line is less than this off its heading (ours): halfway between two sides is no border."""

@@ -13,9 +13,9 @@ from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.skills.chain_files import read_chain, write_chain
-from pbcs_ompl.skills.follow_task import FollowTask
-from pbcs_ompl.skills.follower import Follower, LineView
-from pbcs_ompl.skills.line import Line
+from pbcs_ompl.skills.path_following.follower import Follower, LineView
+from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.path_following.task import FollowTask
 from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
 from pbcs_ompl.skills.trained_controller import TrainedController, actions_of
 from pbcs_ompl.skills.waypoints import Waypoints

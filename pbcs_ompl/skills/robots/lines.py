@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.skills.line import Line
+from pbcs_ompl.skills.path_following.line import Line
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,9 +17,9 @@ from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.judge import Judge
 from pbcs_ompl.skills.evaluation import MOST_EPISODES, Evaluation
-from pbcs_ompl.skills.line import Line
-from pbcs_ompl.skills.robot_follower import RobotFollower
-from pbcs_ompl.skills.robot_worlds import free_space, robot_of
+from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.robots.follower import RobotFollower
+from pbcs_ompl.skills.robots.worlds import free_space, robot_of
 
 EXTRA = 4
 """Patiences in the time limit of an execution, beside those for each near look-ahead of the line (ours)."""

@@ -9,10 +9,10 @@ import numpy as np
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.skills.follow_chain import FollowChain
-from pbcs_ompl.skills.follow_task import LOOKS, FollowTask, LineSettings, Position
-from pbcs_ompl.skills.follower import Progress, Relay
 from pbcs_ompl.skills.method import Snapshot
+from pbcs_ompl.skills.path_following.chain import FollowChain
+from pbcs_ompl.skills.path_following.follower import Progress, Relay
+from pbcs_ompl.skills.path_following.task import LOOKS, FollowTask, LineSettings, Position
 from pbcs_ompl.skills.sequential_test import SequentialTest
 from pbcs_ompl.skills.settings import AgentSpaces, PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer

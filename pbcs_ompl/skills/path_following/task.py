@@ -9,8 +9,8 @@ from pbcs_ompl.core.errors import InvalidState, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
 from pbcs_ompl.skills.episodes import with_random_actions
-from pbcs_ompl.skills.follower import LineView, Progress, Relay
-from pbcs_ompl.skills.line import Line, arc_lengths, erase_loops
+from pbcs_ompl.skills.path_following.follower import LineView, Progress, Relay
+from pbcs_ompl.skills.path_following.line import Line, arc_lengths, erase_loops
 from pbcs_ompl.skills.policy import ObservationTransform
 from pbcs_ompl.skills.settings import Settings
 

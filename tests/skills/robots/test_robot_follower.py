@@ -11,18 +11,18 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, InvalidState, Mismatch, RunFolderError
 from pbcs_ompl.core.seeding import SeedTree
-from pbcs_ompl.skills.follower import Progress
-from pbcs_ompl.skills.follower_evaluation import evaluate_follower
-from pbcs_ompl.skills.free_space import FreeSpace
-from pbcs_ompl.skills.line import Line
-from pbcs_ompl.skills.lines import Lines
+from pbcs_ompl.skills.path_following.follower import Progress
+from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.policy import ObservationTransform
-from pbcs_ompl.skills.robot_follower import RobotFollower
-from pbcs_ompl.skills.robot_settings import RobotSettings
-from pbcs_ompl.skills.robot_starts import Pool
-from pbcs_ompl.skills.robot_view import KEEP_SIDE, RobotView
-from pbcs_ompl.skills.robot_worlds import Worlds, free_space
-from pbcs_ompl.skills.train_follower import FollowerResult, resume_follower, train_follower
+from pbcs_ompl.skills.robots.evaluation import evaluate_follower
+from pbcs_ompl.skills.robots.follower import RobotFollower
+from pbcs_ompl.skills.robots.free_space import FreeSpace
+from pbcs_ompl.skills.robots.lines import Lines
+from pbcs_ompl.skills.robots.settings import RobotSettings
+from pbcs_ompl.skills.robots.starts import Pool
+from pbcs_ompl.skills.robots.train import FollowerResult, resume_follower, train_follower
+from pbcs_ompl.skills.robots.view import KEEP_SIDE, RobotView
+from pbcs_ompl.skills.robots.worlds import Worlds, free_space
 
 POINT = {"lines_per_world": 20, "tests_per_world": 5, "longest": 6.0, "clearance": 0.1, "near": 0.1, "middle": 0.2,
          "far": 0.4, "window": 0.3, "goal_radius": 0.15, "patience": 15, "max_steps": 150, "advance": 0.5,

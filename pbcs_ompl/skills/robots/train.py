@@ -24,10 +24,10 @@ from pbcs_ompl.results.checksums import changed_files
 from pbcs_ompl.results.files import CHECKPOINT, CONFIG, FOLLOWER, RESULT, is_there, read_arrays, read_toml, write_arrays
 from pbcs_ompl.results.folder import RunFolder, read_config
 from pbcs_ompl.results.schema import FollowerConfig, check
-from pbcs_ompl.skills.robot_follower import RobotFollower
-from pbcs_ompl.skills.robot_settings import RobotSettings
-from pbcs_ompl.skills.robot_training import RobotTraining
-from pbcs_ompl.skills.robot_worlds import Worlds
+from pbcs_ompl.skills.robots.follower import RobotFollower
+from pbcs_ompl.skills.robots.settings import RobotSettings
+from pbcs_ompl.skills.robots.training import RobotTraining
+from pbcs_ompl.skills.robots.worlds import Worlds
 from pbcs_ompl.skills.training import CHECKPOINT_SECONDS, training_versions
 
 

@@ -12,10 +12,10 @@ from pbcs_ompl.core.robot import Robot
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.resettable.attributes import EnvAttributes
-from pbcs_ompl.skills.free_space import WIDE, FreeSpace
-from pbcs_ompl.skills.line import Line
-from pbcs_ompl.skills.lines import Lines
-from pbcs_ompl.skills.robot_settings import RobotLineSettings, RobotStartSettings
+from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.robots.free_space import WIDE, FreeSpace
+from pbcs_ompl.skills.robots.lines import Lines
+from pbcs_ompl.skills.robots.settings import RobotLineSettings, RobotStartSettings
 
 BODIES = 64
 """Resets from which bodies are taken."""

@@ -16,10 +16,10 @@ from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
 from pbcs_ompl.skills import load_chain, method_settings
 from pbcs_ompl.skills.agent_interface import load_agent
-from pbcs_ompl.skills.follow import Follow, FollowSettings, Verdict
-from pbcs_ompl.skills.follow_chain import FollowChain
-from pbcs_ompl.skills.follow_task import FollowTask, LineSettings, extended
 from pbcs_ompl.skills.method import Snapshot
+from pbcs_ompl.skills.path_following.chain import FollowChain
+from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings, Verdict
+from pbcs_ompl.skills.path_following.task import FollowTask, LineSettings, extended
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
 

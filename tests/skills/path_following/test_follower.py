@@ -6,8 +6,8 @@ import pytest
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.resettable.actions import ActionMap
-from pbcs_ompl.skills.follower import Follower, LineView, Progress
-from pbcs_ompl.skills.line import Line
+from pbcs_ompl.skills.path_following.follower import Follower, LineView, Progress
+from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.policy import ObservationTransform
 
 LOW, HIGH = np.full(2, -0.1), np.full(2, 0.1)

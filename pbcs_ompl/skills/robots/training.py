@@ -13,12 +13,12 @@ from pbcs_ompl.agents.rollout import Rollout
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.skills.episodes import with_random_actions
-from pbcs_ompl.skills.follower import Progress
+from pbcs_ompl.skills.path_following.follower import Progress
 from pbcs_ompl.skills.policy import ObservationTransform
-from pbcs_ompl.skills.robot_settings import RobotSettings
-from pbcs_ompl.skills.robot_starts import StartDrawer, Starts
-from pbcs_ompl.skills.robot_view import RobotView
-from pbcs_ompl.skills.robot_worlds import Worlds, bodies
+from pbcs_ompl.skills.robots.settings import RobotSettings
+from pbcs_ompl.skills.robots.starts import StartDrawer, Starts
+from pbcs_ompl.skills.robots.view import RobotView
+from pbcs_ompl.skills.robots.worlds import Worlds, bodies
 
 TEST_PATIENCE = 4
 """Multiples of the patience after which an execution of a test has failed (ours)."""

@@ -18,11 +18,11 @@ from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.actions import ActionMap, Actions
 from pbcs_ompl.results.files import read_bytes, read_json, write_json
 from pbcs_ompl.results.schema import Limit, Positive, Table, check
-from pbcs_ompl.skills.follower import Progress
-from pbcs_ompl.skills.line import Line, erase_loops
+from pbcs_ompl.skills.path_following.follower import Progress
+from pbcs_ompl.skills.path_following.line import Line, erase_loops
 from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
-from pbcs_ompl.skills.robot_view import RobotView
-from pbcs_ompl.skills.robot_worlds import robot_of
+from pbcs_ompl.skills.robots.view import RobotView
+from pbcs_ompl.skills.robots.worlds import robot_of
 from pbcs_ompl.skills.side_by_side import SideBySide
 
 STRUCTURE, POLICY = "follower.json", "follower.safetensors"

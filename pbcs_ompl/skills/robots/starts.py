@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.skills.robot_settings import RobotStartSettings
-from pbcs_ompl.skills.robot_worlds import Worlds
+from pbcs_ompl.skills.robots.settings import RobotStartSettings
+from pbcs_ompl.skills.robots.worlds import Worlds
 
 ADVANCED, STALLED = 8000, 3000
 """Sizes of the two pools (ours)."""

@@ -1,0 +1,1 @@
+"""Following a plan: a line in feature space, the policy that moves along it, and its training."""
