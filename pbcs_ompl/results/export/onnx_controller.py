@@ -88,8 +88,8 @@ def _stacked(graph: Graph, arrays: dict[str, Any], count: int, name: str, chosen
     """Return the parameters `name` of the networks `chosen` [B, ...]."""
     each = [arrays[f"network{index}.{name}"] for index in range(count)]
     if any(one.shape != each[0].shape for one in each):
-        raise InvalidOption(f"networks of the shapes {sorted({one.shape for one in each})}; ONNX files hold policies of "
-                            "one shape: use --to numpy")
+        raise InvalidOption(f"networks of the shapes {sorted({one.shape for one in each})}; ONNX files hold policies "
+                            "of one shape: use --to numpy")
     return graph("Gather", np.array(each), chosen, axis=0)
 
 
