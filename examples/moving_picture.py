@@ -18,7 +18,7 @@ GROWING, RESTING, RUNNING, COLOURS = 40, 8, 50, 32
 
 
 def main(size: str = "5", file: str = "runs/plan_and_chain.gif") -> None:
-    model = pbcs_ompl.make("pbcs/Maze-v0", {"size": int(size), "maze_seed": 1} if int(size) > 3 else {"size": int(size)})
+    model = pbcs_ompl.make("pbcs/Maze-v0", {"size": int(size), "maze_seed": 1})
     plan = pbcs_ompl.plan(model, planner="Rides", seed=0)
     if plan.trajectory is None:
         sys.exit("no path was found")
