@@ -2,6 +2,7 @@
 
 import os
 import re
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,7 +31,8 @@ def write_minari(recorder: Recorder, episodes: Sequence[Episode], folder: Path) 
     except ModuleNotFoundError as error:
         raise MissingDependency('data sets of Minari need minari: pip install "pbcs-ompl[minari]"') from error
     sources = list(dict.fromkeys(episode.source for episode in episodes))
-    with write_errors(folder), _root(folder):
+    with write_errors(folder), _root(folder), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of Minari, about authors that it is not given
         for source in sources:
             buffers = [EpisodeBuffer(
                 id=index, seed=episode.reset_seed, options=recorder.model.spec.reset_options,

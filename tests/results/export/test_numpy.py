@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.results.export.controllers import CASES, actions_of
 
-from pbcs_ompl import deploy
 from pbcs_ompl.results.export.controller_data import controller_data
 from pbcs_ompl.results.export.numpy_controller import write_numpy
+from tests.results.export.controllers import CASES, actions_of
 
 ALONE = """
 import sys
