@@ -12,7 +12,7 @@ from pbcs_ompl.cli.arguments import build_parser, parse
 from pbcs_ompl.experiments.study import find_study
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 README = PAGES[0].read_text()
 IN_ORDER = [ROOT / "docs" / name for name in ("deploy.md", "export.md")]
 """Pages whose commands and snippets use what those above them have made."""
@@ -111,6 +111,13 @@ def test_the_first_forty_lines_hold_what_a_visitor_needs():
     assert "make test" in head
     assert "```python" in head
     assert head.count("```") == 4
+
+
+def test_every_example_is_in_the_gallery():
+    page = (ROOT / "docs" / "gallery.md").read_text()
+    for path in (ROOT / "examples").glob("*.py"):
+        assert f"literalinclude}} ../examples/{path.name}" in page
+        assert path.read_text().split('"""')[1].strip().splitlines()[0] in page  # its question
 
 
 def test_the_readme_is_short():
