@@ -1,4 +1,4 @@
-"""What an action costs: the controller of the toolkit, the NumPy file, and the ONNX graph where onnxruntime is installed.
+"""What an action costs: the controller of the toolkit, the NumPy file, and the ONNX graph where there is onnxruntime.
 
     python tests/benchmarks/controller_speed.py
 
@@ -6,6 +6,7 @@ The networks are random, of (64, 64) but for the ant that comes with the package
 alternate, one episode, one thread.
 """
 
+# ruff: noqa: E402
 import os
 import sys
 import tempfile
@@ -74,7 +75,8 @@ def main() -> None:
                     act(observation)
                 seconds[kind].append((time.perf_counter() - began) / len(row))
         found = {kind: 1e6 * float(np.median(times)) for kind, times in seconds.items()}
-        print(f"{name:<28}{found['toolkit']:>10.1f}{found['NumPy file']:>12.1f}{found.get('onnxruntime', np.nan):>13.1f}")
+        print(f"{name:<28}{found['toolkit']:>10.1f}{found['NumPy file']:>12.1f}"
+              f"{found.get('onnxruntime', np.nan):>13.1f}")
 
 
 if __name__ == "__main__":
