@@ -46,7 +46,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
     capabilities: frozenset[Capability] = frozenset({"visited", "exact"})
     perturb_by_rollouts = True
     exploring = False
-    """Whether steps are made only to see what range the feature has."""
+    """Whether steps are made only to see what range the feature has: no state of theirs is restored."""
     goal_radius = 1.0
     """A state is a success if its distance to the goal is smaller, where the environment reports one."""
 

@@ -15,10 +15,12 @@ from pbcs_ompl.resettable.memory.plain_values import is_plain
 from pbcs_ompl.resettable.task_env import bare
 
 NOT_STATE = frozenset({"np_random", "_np_random", "_np_random_seed", "spec", "metadata", "action_space",
-                       "observation_space", "render_mode", "mujoco_renderer"})
+                       "observation_space", "render_mode", "mujoco_renderer", "_ezpickle_args", "_ezpickle_kwargs"})
 """Attributes that every environment may have and that no step depends on; generators are looked at by themselves."""
 LIBRARIES = frozenset({"numpy", "gymnasium", "mujoco", "glfw", "OpenGL", "pygame", "PIL", "cv2", "imageio",
                        "matplotlib", "logging", "numba", "xml"})
+SIMULATION = "dm_control.mujoco"
+"""The package whose objects are MuJoCo's model and data, which are saved as such."""
 """Packages whose objects are no state of an environment: spaces, renderers, logs. Generators are looked at apart."""
 DEEPEST = 6
 MOST_OBJECTS = 2000
@@ -147,7 +149,7 @@ def _has_inside(value: Any) -> bool:
 
 def _is_foreign(value: Any) -> bool:
     """Return whether a value is a function, or an object of a library that is no environment."""
-    if isinstance(value, FUNCTIONS):
+    if isinstance(value, FUNCTIONS) or type(value).__module__.startswith(SIMULATION):
         return True
     if isinstance(value, gymnasium.Env) or type(value).__name__ == "MjData":
         return False
