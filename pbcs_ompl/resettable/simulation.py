@@ -9,7 +9,7 @@ from pbcs_ompl.resettable.task_env import bare
 DM_CONTROL = "dm_control.rl.control"
 """The module of the environments of dm_control's suite."""
 COMPOSER = "dm_control.composer.environment"
-"""That of the others, whose model is compiled anew in each reset."""
+"""That of the others, whose model each reset compiles."""
 
 
 class Simulation:

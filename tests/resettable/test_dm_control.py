@@ -1,4 +1,4 @@
-"""Environments of dm_control's suite, through shimmy: MuJoCo environments whose model and data are one step further in."""
+"""Environments of dm_control's suite, through shimmy: MuJoCo, whose model and data are one step further in."""
 
 from typing import Any
 

@@ -134,7 +134,7 @@ def test_actions_are_replayed_where_copies_are_not_faithful(kind: type[Slider]) 
 def test_instances_that_differ_are_refused_for_what_they_are() -> None:
     gymnasium.register("tests/Built-v0", Built)
     try:
-        with pytest.raises(NotResettable, match="constructor drew random numbers.*at step 1"):
+        with pytest.raises(NotResettable, match=r"constructor drew random numbers.*at step 1"):
             make("tests/Built-v0")
     finally:
         del gymnasium.registry["tests/Built-v0"]

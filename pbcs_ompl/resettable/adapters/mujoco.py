@@ -1,5 +1,6 @@
 """The adapter for every environment in which MuJoCo runs: Gymnasium's, gymnasium-robotics', dm_control's, yours."""
 
+import math
 import os
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -15,8 +16,8 @@ from pbcs_ompl.resettable.adapters.mujoco_probe import find_read_first
 from pbcs_ompl.resettable.adapters.mujoco_state import PHYSICS, ModelParts, Physics
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes, plain_copies
-from pbcs_ompl.resettable.memory.memory import GUARD_EVERY, Memory
-from pbcs_ompl.resettable.rules import FeatureRule, Outcome, feature_rule
+from pbcs_ompl.resettable.memory.memory import Memory
+from pbcs_ompl.resettable.rules import FeatureRule, feature_rule
 from pbcs_ompl.resettable.simulation import Simulation, simulation_of
 from pbcs_ompl.resettable.supported import task_env
 from pbcs_ompl.resettable.task_env import bare
@@ -53,7 +54,6 @@ class MujocoEnv(RestorableEnv):
             self._parts.look(model, after_reset=event == "reset")
         self._memory = Memory(inner, changes, before, known=(self._simulation.data,))
         self._read_first = find_read_first(self._simulation, self._physics, self._parts, self._memory)
-        self._saves = 0
         self.goal_radius = float(getattr(inner, "distance_threshold", MAZE_GOAL_RADIUS))
         super().__init__(inner, goal, feature)
         self.walls = wall_rectangles(inner.maze) if has_map(inner) else np.empty((0, 4))
@@ -78,9 +78,6 @@ class MujocoEnv(RestorableEnv):
 
     def save(self) -> Array:
         """Return physics, what is read before it is written, what changes in the model, and attributes."""
-        self._saves += 1
-        if self._saves % GUARD_EVERY == 0:
-            self.check_constants()
         model, data = self._simulation.model, self._simulation.data
         return np.concatenate([self._physics.save(model, data), self._read_first.save(data), self._parts.save(model),
                                self._memory.save()])
@@ -125,11 +122,12 @@ class MujocoEnv(RestorableEnv):
         self._mujoco.mj_camlight(self._simulation.model, self._simulation.data)
         return self.inner.render()
 
-    def reported_goal_distance(self, outcome: Outcome) -> float | None:
+    def reported_goal_distance(self, observation: Any) -> float | None:
         """Return the distance between achieved and desired goal, where they are points."""
-        if not isinstance(outcome.observation, dict) or not self._has_goal:
+        if not isinstance(observation, dict) or not self._has_goal:
             return None
-        return float(np.linalg.norm(outcome.observation["achieved_goal"] - outcome.observation["desired_goal"]))
+        gap = observation["achieved_goal"] - observation["desired_goal"]
+        return math.sqrt(gap.dot(gap))
 
     def feature_box(self) -> tuple[Array, Array] | None:
         """Return the extent of a maze, if that is what is explored."""

@@ -84,7 +84,7 @@ class VisitedEnv(RestorableEnv):
         return outcome
 
     def _visit(self, observation: Array, before: float | None, action: Array | None) -> None:
-        """Keep the present state, unless nobody will ask for it again."""
+        """Keep the present state, unless it is never restored."""
         if not self.exploring:
             self._observations[self._name] = observation
             self.keep(self._name, before, action)

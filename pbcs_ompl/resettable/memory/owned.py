@@ -5,7 +5,8 @@ import random
 import sys
 import types
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -103,13 +104,26 @@ def find(root: Any, path: Path) -> Any:
     return root
 
 
+def finder(path: Path) -> Callable[[Any], Any]:
+    """Return `find` for one path, as fast as it can be, of environments without wrappers."""
+    if not path:
+        return lambda root: root
+    if any(step.is_item for step in path):
+        return lambda root: find(root, path)
+    return attrgetter(".".join(step.key for step in path))
+
+
 def put(root: Any, path: Path, value: Any) -> None:
     """Set the value at a path."""
-    owner, (key, is_item) = find(root, path[:-1]), path[-1]
-    if is_item:
-        owner[key] = value
+    set_part(find(root, path[:-1]), path[-1], value)
+
+
+def set_part(owner: Any, step: Step, value: Any) -> None:
+    """Set an attribute or item of an object."""
+    if step.is_item:
+        owner[step.key] = value
     else:
-        object.__setattr__(owner, key, value)
+        object.__setattr__(owner, step.key, value)
 
 
 def remove(root: Any, path: Path) -> None:
