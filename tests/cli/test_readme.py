@@ -11,7 +11,7 @@ from pbcs_ompl.cli.arguments import build_parser, parse
 from pbcs_ompl.experiments.study import find_study
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 README = PAGES[0].read_text()
 
 
@@ -89,6 +89,13 @@ def test_the_first_forty_lines_hold_what_a_visitor_needs():
     assert "make test" in head
     assert "```python" in head
     assert head.count("```") == 4
+
+
+def test_every_example_is_in_the_gallery():
+    page = (ROOT / "docs" / "gallery.md").read_text()
+    for path in (ROOT / "examples").glob("*.py"):
+        assert f"literalinclude}} ../examples/{path.name}" in page
+        assert path.read_text().split('"""')[1].strip().splitlines()[0] in page  # its question
 
 
 def test_the_readme_is_short():
