@@ -7,7 +7,8 @@ import numpy as np
 
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, is_mujoco_env
+from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv
+from pbcs_ompl.resettable.simulation import simulation_of
 
 SEGMENTS = 16
 """Corners around a capsule or cylinder, of which a page holds dozens."""
@@ -54,23 +55,24 @@ def bodies_in(model: ResettableModel, states: Array) -> Bodies | None:
     None where there is no MuJoCo, or where the feature is not the place of a body, so that bodies and tree would have
     nothing to do with each other.
     """
-    env: Any = model.env.inner if isinstance(model.env, MujocoEnv) else model.env
-    if env is None or not is_mujoco_env(env):
+    env = model.env.inner if isinstance(model.env, MujocoEnv) else model.env
+    simulation = simulation_of(env)
+    if simulation is None:
         return None
     import mujoco
 
-    simulation: Any = mujoco
-    moves, shapes = env.model.body_weldid, env.model.body_geomnum
-    moving = [body for body in range(1, env.model.nbody) if moves[body] and shapes[body]]
+    functions: Any = mujoco
+    body, data = simulation.model, simulation.data
+    moving = [index for index in range(1, body.nbody) if body.body_weldid[index] and body.body_geomnum[index]]
     before = np.array(model.env.get_env_state())
     positions, turns = [], []
     for state in states:
         model.env.set_env_state(np.array(state))
-        simulation.mj_kinematics(env.model, env.data)
-        positions.append(np.array(env.data.xpos[moving]))
-        turns.append(np.array(env.data.xquat[moving]))
+        functions.mj_kinematics(body, data)
+        positions.append(np.array(data.xpos[moving]))
+        turns.append(np.array(data.xquat[moving]))
     model.env.set_env_state(before)
-    found = Bodies(env.model, moving, np.array(positions), np.array(turns))
+    found = Bodies(body, moving, np.array(positions), np.array(turns))
     features = model.feature(states)
     if features.shape[1] < 2 or not moving:
         return None
