@@ -52,11 +52,11 @@ class DistillSettings(Settings):
 
     width: int = 128
     depth: int = 2
-    rounds: int = 30
-    episodes: int = 50
+    rounds: int = 15
+    episodes: int = 300
     epsilon: float = 0.1
     turn: int = 10
-    updates: int = 1000
+    updates: int = 2000
     batch_size: int = 256
     learning_rate: float = 1e-3
     flawless_rounds: int = 3
@@ -122,8 +122,8 @@ def distill(teacher: TrainedController, *, settings: dict[str, Any] | None = Non
     Source: DAgger (Ross, Gordon and Bagnell, AISTATS 2011). In the first round the teacher drives; in all others it and
     the student take turns. Every state is labelled with what the teacher does there, and the student is fitted to all
     states so far. Differs: turns last some steps, and a fraction `epsilon` of actions is random. A chain keeps in mind
-    how far it has come, and a student that passes by an activation set leads it astray; so the student never drives
-    alone, and episodes that fail are left out. Of all students, the one that succeeds most often alone is kept.
+    how far it has come, and a student that passes by an activation set leads it astray; so the teacher ends each
+    episode, and those that fail are left out. Of all students, the one that succeeds most often alone is kept.
 
     Args:
         teacher: A chain, or a follower of one line.
@@ -159,7 +159,7 @@ class _Distillation:
         self.teacher, self.model, self.settings, self.seed, self.on_progress = (
             teacher, model, settings, seed, on_progress)
         self.rng = SeedTree(seed).child("distill").generator()
-        self.counter, self.updates = Counter(), 0
+        self.counter, self.updates, self.longest = Counter(), 0, 0
         self.low, self.high = teacher.actions.low, teacher.actions.high
         sizes = (model.observation_size, *[settings.width] * settings.depth, len(self.low))
         self.network = TrainedNetwork(MLP(sizes), [self.rng], torch.device("cpu"))
@@ -205,7 +205,9 @@ class _Distillation:
     def _collect(self, student: SkillChain | None) -> None:
         """Add the states of episodes that the teacher drives, in turns with a student, and what the teacher does there.
 
-        Episodes that fail are left out: the teacher has lost its way in them, and so are its actions no advice.
+        In half of the episodes they take short turns; in the others the student begins, for as long as it may need
+        to get lost, and the teacher finishes. Episodes that fail are left out: the teacher has lost its way in them, so
+        its actions are no advice.
         """
         model, actions, count = self.model, self.teacher.actions, self.settings.episodes
         teacher, other = self.teacher.controller(), None if student is None else student.controller()
@@ -214,14 +216,16 @@ class _Distillation:
                 controller.reset(count)
         states, alive = np.repeat(self.teacher.start[None], count, axis=0), np.arange(count)
         success, in_turn = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+        handed_over = np.where(np.arange(count) % 2, self.rng.integers(0, 2 * self.longest + 1, count), 0)
         kept: list[tuple[IndexArray, Array, Array]] = []
-        for _ in range(self.teacher.time_limit):
+        for step in range(self.teacher.time_limit):
             seen = model.observe(states[alive])
             controls = actions.to_controls(teacher.act(seen, alive))
             kept.append((alive, seen, controls.copy()))
             if other is not None:
-                in_turn ^= self.rng.random(count) < 1.0 / self.settings.turn
-                controls = np.where(in_turn[alive, None], actions.to_controls(other.act(seen, alive)), controls)
+                in_turn ^= (self.rng.random(count) < 1.0 / self.settings.turn) & (handed_over == 0)
+                driven = (in_turn | (step < handed_over))[alive, None]
+                controls = np.where(driven, actions.to_controls(other.act(seen, alive)), controls)
             controls = with_random_actions(model, controls, self.settings.epsilon, self.rng)
             self.counter.spend(len(alive))
             outcome = model.transition(states[alive], controls)
@@ -230,6 +234,8 @@ class _Distillation:
             alive = alive[~(outcome.success | outcome.ended)]
             if not len(alive):
                 break
+        if student is None:
+            self.longest = step + 1
         for members, seen, controls in kept:
             self.observations.append(seen[success[members]])
             self.labels.append(controls[success[members]])
