@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import GROWTH, resized_copy
-from pbcs_ompl.planners.kernels.cells import WEIGHT, find_hashed, linear_hash, rehash
+from pbcs_ompl.planners.kernels.cells import find_cell, rehash
 from pbcs_ompl.planners.kernels.ranking import (
     CHILD,
     COUNT,
@@ -76,25 +76,31 @@ REGIONS_TYPE = types.NamedTuple((_rows, types.int64[:, ::1], types.int32[::1], _
 
 def no_regions(num_features: int, scales: int) -> Regions:
     """Return the arrays without regions; their rows cost no memory until they are written to."""
-    most, pool = 1 << 11, 1 << 14
+    most, pool = 1 << 12, 1 << 14
     tails = np.zeros((scales, 2), np.int32)
     tails[:, LOWEST] = -1
     totals = np.zeros(3, np.int64)
     totals[FREE_RUN] = -1
     return Regions(
         rows=np.empty((most, 10), np.int32), cells=np.empty((most, 1 + num_features), np.int64),
-        table=np.zeros(4 * most, np.int32), order=np.empty((scales, most), np.int32),
+        table=_table(most), order=np.empty((scales, most), np.int32),
         runs=np.empty((most, 5), np.int32), tails=tails, totals=totals, pool=np.empty((pool, 1), np.int32),
         free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64),
         cell=np.zeros(1 + num_features, np.int64))
 
 
-def reserve(regions: Regions, nodes: int) -> Regions:
-    """Return the regions with space for `nodes` more nodes; those that were passed are not to be used any more."""
+def reserve(regions: Regions, nodes: int, bins: int) -> Regions:
+    """Return the regions with space for more nodes; those that were passed are not to be used any more.
+
+    Args:
+        regions: The regions.
+        nodes: How many nodes are to come.
+        bins: How many of them may open a bin.
+    """
     known, scales, size = int(regions.totals[REGIONS]), len(regions.order), len(regions.rows)
-    if known + scales * nodes > size:
-        size = max(GROWTH * size, known + scales * nodes)
-        cells, table = resized_copy(regions.cells, known, size), np.zeros(4 << (size - 1).bit_length(), np.int32)
+    if known + scales * bins > size:
+        size = max(GROWTH * size, known + scales * bins)
+        cells, table = resized_copy(regions.cells, known, size), _table(size)
         rehash(cells, table, known)
         order = np.empty((scales, size), np.int32)
         order[:, :known] = regions.order[:, :known]
@@ -105,6 +111,11 @@ def reserve(regions: Regions, nodes: int) -> Regions:
         regions = regions._replace(pool=resized_copy(regions.pool, int(regions.used[USED]),
                                                      max(GROWTH * len(regions.pool), rows)))
     return regions
+
+
+def _table(regions: int) -> NDArray[np.int32]:
+    """Return an empty hash table, at least half of which stays empty."""
+    return np.zeros(2 << (regions - 1).bit_length(), np.int32)
 
 
 @njit(inline="always")
@@ -126,7 +137,7 @@ def add_node(rows: Rows, pool: Rows, free: NDArray[np.int32], used: NDArray[np.i
     rows[number, LENGTH] = length + 1
 
 
-@njit()
+@njit(inline="always")
 def open_bin(regions: Regions, cell: NDArray[np.int64]) -> Number:
     """Open the bin of `cell` [F + 1] (overwritten), and the regions around it that are not open; return its number."""
     rows, cells, table, order, runs, tails, totals, pool, free, used, _ = regions
@@ -134,8 +145,7 @@ def open_bin(regions: Regions, cell: NDArray[np.int64]) -> Number:
     inner = np.int64(-1)
     for scale in range(len(order)):
         cell[features] = scale
-        mixed = linear_hash(cell)
-        place = find_hashed(cells, table, cell, mixed)
+        place = find_cell(cells, table, cell)
         number = np.int64(table[place]) - 1
         known = number >= 0
         if not known:
@@ -147,7 +157,7 @@ def open_bin(regions: Regions, cell: NDArray[np.int64]) -> Number:
             rows[number, PARENT] = rows[number, CHILD] = rows[number, SIBLING] = -1
             rows[number, COUNT] = rows[number, LENGTH] = 0
             enter(order, runs, tails, totals, rows, scale, number)
-            _meet_neighbours(rows, cells, table, order, runs, tails, totals, scale, number, cell, mixed)
+            _meet_neighbours(rows, cells, table, order, runs, tails, totals, scale, number, cell)
         if inner >= 0:
             rows[inner, PARENT], rows[inner, SIBLING] = number, rows[number, CHILD]
             rows[number, CHILD] = inner
@@ -162,14 +172,14 @@ def open_bin(regions: Regions, cell: NDArray[np.int64]) -> Number:
 
 @njit(inline="always")
 def _meet_neighbours(rows: Rows, cells: NDArray[np.int64], table: NDArray[np.int32], order: Rows, runs: Rows,
-                     tails: Rows, totals: NDArray[np.int64], scale: Number, number: Number, cell: NDArray[np.int64],
-                     mixed: np.uint64) -> None:
+                     tails: Rows, totals: NDArray[np.int64], scale: Number, number: Number,
+                     cell: NDArray[np.int64]) -> None:
     """Count the neighbours of a new region that are not open; those that it surrounds, and itself, rise."""
-    missing, weight = 2 * (len(cell) - 1), WEIGHT
+    missing = 2 * (len(cell) - 1)
     for axis in range(len(cell) - 1):
         for side in (-1, 1):
             cell[axis] += side
-            place = find_hashed(cells, table, cell, mixed + np.uint64(side) * weight)
+            place = find_cell(cells, table, cell)
             cell[axis] -= side
             other = np.int64(table[place]) - 1
             if other >= 0:
@@ -177,7 +187,6 @@ def _meet_neighbours(rows: Rows, cells: NDArray[np.int64], table: NDArray[np.int
                 rows[other, MISSING] -= 1
                 if rows[other, MISSING] == 0:
                     lift(order, runs, tails, totals, rows, scale, other, key_of(rows, other))
-        weight *= WEIGHT
     rows[number, MISSING] = missing
     if missing == 0:
         lift(order, runs, tails, totals, rows, scale, number, key_of(rows, number))

@@ -12,7 +12,7 @@ from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, call_step
 from pbcs_ompl.planners.kernels.cells import cell_of, find_cell
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
 from pbcs_ompl.planners.kernels.memory import uncounted
-from pbcs_ompl.planners.kernels.ranking import CHILD, COUNT, LENGTH, PARENT, SIBLING, START, lift, lowest
+from pbcs_ompl.planners.kernels.ranking import CHILD, COUNT, LENGTH, PARENT, REGIONS, SIBLING, START, lift, lowest
 from pbcs_ompl.planners.kernels.regions import REGIONS_TYPE, Regions, add_node, key_of, open_bin
 from pbcs_ompl.planners.kernels.runs import Number, Rows
 
@@ -183,7 +183,7 @@ def note(regions: Regions, yields: Array, rides: IndexArray, count: int, columns
 def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
             columns: Columns, first: int, most: int, regions: Regions, bin_size: Array, longest: int, yields: Array,
             rides: IndexArray, actions: Array, rng: np.random.Generator) -> tuple[int, bool]:
-    """Ride, one ride after the other, for `most` steps.
+    """Ride, one ride after the other, for `most` steps, or until there is no space to open a bin.
 
     Args:
         parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
@@ -191,7 +191,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
         bounds: Lower and upper bounds of the controls [2, A].
         columns, first: The tree's arrays, with space for `most` more nodes, and the number of nodes so far.
         most: How many steps.
-        regions, bin_size: The regions, with space for `most` more nodes, and the edges of the bins [F].
+        regions, bin_size: The regions, with space for `most` more nodes and a bin, and the edges of the bins [F].
         longest: The most steps of a ride.
         yields: Bins opened and steps used so far, and the weight [3, answers, 3], by scale, kind and patience.
         rides, actions: The first row of each is the ride in progress, and its control.
@@ -207,6 +207,8 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
     bounds, bin_size, feature_dims = uncounted(bounds), uncounted(bin_size), uncounted(feature_dims)
     rows, cells, places, order, runs, tails, totals, pool, free, used, cell = regions
     for child in range(first, first + most):
+        if totals[REGIONS] + len(order) > len(rows):
+            return child - first, False
         if rides[0, ACTIVE] == 0:
             _begin(rows, order, runs, tails, totals, pool, yields, bounds, rides, actions, 0, rng)
         node = rides[0, NODE]

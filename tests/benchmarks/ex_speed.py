@@ -10,6 +10,7 @@ planners compare with OMPL's is measured by native_ompl/bench.py.
 import argparse
 import resource
 import time
+from dataclasses import replace
 from typing import Any
 
 from ompl import base as ob
@@ -28,8 +29,9 @@ def walled_in(size: int) -> dict[str, Any]:
     """Return the options of a maze whose goal cannot be reached."""
     layout = MazeLayout.from_size(size, 0)
     last = size - 1
-    layout.vertical[last, last] = layout.horizontal[last, last] = True
-    return {"layout": layout.draw()}
+    vertical, horizontal = layout.vertical.copy(), layout.horizontal.copy()
+    vertical[last, last] = horizontal[last, last] = True
+    return {"layout": replace(layout, vertical=vertical, horizontal=horizontal).draw()}
 
 
 def growing_tree(name: str, size: int, sizes: list[int]) -> None:

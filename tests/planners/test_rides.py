@@ -113,7 +113,7 @@ def test_opening_the_same_world_in_any_order_gives_the_same_regions():
     rng, points = np.random.default_rng(0), np.array([(x, y) for x in range(-9, 9) for y in range(-9, 9)])
     counts = set()
     for _ in range(3):
-        regions = reserve(no_regions(2, 4), len(points))
+        regions = reserve(no_regions(2, 4), len(points), len(points))
         for point in rng.permutation(points):
             open_bin(regions, np.array([*point, 0]))
         check_regions(regions, 2)
