@@ -1,5 +1,7 @@
 """Plan with OMPL in any environment that can be reset, then turn the plan into a robust closed-loop policy.
 
+For example::
+
     import pbcs_ompl
 
     plan = pbcs_ompl.plan("pbcs/Maze-v0", env_kwargs={"size": 5, "maze_seed": 1}, seed=0)

@@ -11,7 +11,7 @@ from pbcs_ompl.cli.arguments import build_parser, parse
 from pbcs_ompl.experiments.study import find_study
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 README = PAGES[0].read_text()
 
 
@@ -91,8 +91,20 @@ def test_the_first_forty_lines_hold_what_a_visitor_needs():
     assert head.count("```") == 4
 
 
+def test_every_example_is_in_the_gallery():
+    page = (ROOT / "docs" / "gallery.md").read_text()
+    for path in (ROOT / "examples").glob("*.py"):
+        assert f"literalinclude}} ../examples/{path.name}" in page
+        assert path.read_text().split('"""')[1].strip().splitlines()[0] in page  # its question
+
+
+def test_the_readme_is_short():
+    assert len(README.splitlines()) <= 90
+
+
 def test_every_folder_of_the_overview_exists():
-    tree = next(block for block in blocks(README, "") if "resettable/" in block)
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    tree = next(block for block in blocks(page, "") if "resettable/" in block)
     named = {("pbcs_ompl/" if indent else "") + name
              for indent, name in re.findall(r"^( *)(\w+)/", tree, flags=re.MULTILINE)}
     assert all((ROOT / name).is_dir() for name in named)
@@ -104,11 +116,12 @@ def test_the_picture_is_what_its_command_makes(tmp_path, monkeypatch):
     """The command is that of `make demo`, which the caption names."""
     from matplotlib.image import imread
 
-    assert "`chain.png` of `make demo`" in README
+    page = (ROOT / "docs" / "skills.md").read_text()
+    assert "`chain.png` of `make demo`" in page
     (recipe,) = re.findall(r"^\t\$\(BIN\)/pbcs (train .*)$", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
     monkeypatch.chdir(tmp_path)
     assert main(shlex.split(recipe)) == 0
-    (shown,) = re.findall(r"!\[.*\]\((.*)\)", README)
+    shown = "docs/pictures/chain.png"
     made, kept = imread(tmp_path / "runs/demo/chain.png"), imread(ROOT / shown)
     assert made.shape == kept.shape
     different = (abs(made - kept) > 0.1).any(axis=2).mean()
