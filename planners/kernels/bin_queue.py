@@ -30,7 +30,6 @@ from pbcs_ompl.planners.kernels.runs import (
 )
 from pbcs_ompl.planners.kernels.slices import CLASSES, SMALLEST, double, rows_needed, take
 
-
 RUNS_A_NODE = 4
 """The most new runs when a bin and a node of it are chosen, and a node and its bin are added."""
 
@@ -116,7 +115,8 @@ def reserve(queue: BinQueue, count: int) -> BinQueue:
                                order=resized_copy(queue.order, bins, most))
     runs = int(queue.totals[RUNS]) + RUNS_A_NODE * count
     if runs > len(queue.runs):
-        queue = queue._replace(runs=resized_copy(queue.runs, int(queue.totals[RUNS]), max(GROWTH * len(queue.runs), runs)))
+        queue = queue._replace(runs=resized_copy(queue.runs, int(queue.totals[RUNS]),
+                                                 max(GROWTH * len(queue.runs), runs)))
     rows = rows_needed(queue.used, count)
     if rows > len(queue.pool):
         queue = queue._replace(pool=resized_copy(queue.pool, int(queue.used[0]), max(GROWTH * len(queue.pool), rows)))

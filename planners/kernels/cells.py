@@ -37,7 +37,7 @@ def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[
     if len(cell) > 1:
         within |= (cell[1] & 3) << 2
     hashed = np.int64(mixed >> np.uint64(28)) ^ within
-    place = hashed & (len(table) - 1)
+    place: Number = hashed & (len(table) - 1)
     while table[place] > 0:
         same = True
         for axis in range(len(cell)):

@@ -82,7 +82,7 @@ def expand(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Index
         steps = longest
         if longest > least:
             steps = least + int(uniforms[row, 2 + bounds.shape[1]] * (longest - least + 1))
-        for taken in range(min(steps, end - child)):
+        for _ in range(min(steps, end - child)):
             for axis in range(bounds.shape[1]):
                 low, high = bounds[0, axis], bounds[1, axis]
                 controls[child, axis] = low + (high - low) * uniforms[row, 2 + axis]

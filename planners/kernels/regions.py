@@ -59,8 +59,8 @@ class Regions(NamedTuple):
     def nbytes(self) -> int:
         """Bytes of all arrays; rows that were never written to are not counted."""
         regions, runs = int(self.totals[REGIONS]), int(self.totals[RUNS])
-        return (self.rows[:regions].nbytes + self.cells[:regions].nbytes + self.table.nbytes + 4 * regions
-                + self.runs[:runs].nbytes + self.pool[:self.used[USED]].nbytes)
+        return int(self.rows[:regions].nbytes + self.cells[:regions].nbytes + self.table.nbytes + 4 * regions
+                   + self.runs[:runs].nbytes + self.pool[:self.used[USED]].nbytes)
 
 
 _rows = types.int32[:, ::1]

@@ -1,10 +1,10 @@
 """A least-count queue: members sorted by decreasing count, raised in O(1), four bytes each.
 
 A queue is a slice of an array of members. Equal counts form a run. The lowest run is the tail of the slice; where it
-begins and its count stand in the queue's head, with what is known of the next higher run: a count, and a row of `runs`,
-where stands where that one begins, and so on. All changes are made to the lowest run and the one above it: a random
-member of the lowest run is one random number away, and raising it is a swap with the first of its run, which then is the
-end of the run above.
+begins and its count stand in the queue's head, with the count of the next higher run and its row in `runs`, where its
+beginning stands, and so on. All changes are made to the lowest run and the one above it: a random member of the
+lowest run is one random number away, and raising it is a swap with the first of its run, which then is the end of the
+run above.
 """
 
 from typing import Any
@@ -18,10 +18,14 @@ RUN = np.dtype([("first", np.int32), ("count", np.int32), ("higher", np.int32), 
 """A run: where it begins, its count, and the next higher run: its row, or -1, and its count."""
 HEAD = np.dtype([*((name, np.int32) for name in RUN.names or ()), ("start", np.int32), ("length", np.int32),
                  ("size", np.int32), ("unused", np.int32)])
-"""A queue: its lowest run, its first place among the members, its length; `size` (log2 of the space) is for the owner."""
-RUNS, FREE_RUN = 0, 1  # places of `totals`: runs ever used, and the first free one (the next is in its HIGHER), or -1
+"""A queue: its lowest run, its first place among the members, its length; `size`, log2 of its space, is the
+owner's."""
+RUNS, FREE_RUN = 0, 1  # places of `totals`: runs ever used, and the first free one (the next is its `higher`), or -1
 Rows = NDArray[np.int32]
-Heads = Runs = Any
+Heads = NDArray[np.void]
+"""Records of HEAD [Q]."""
+Runs = NDArray[np.void]
+"""Records of RUN [K]."""
 
 Members = NDArray[np.int32]
 Number = int | np.integer[Any]

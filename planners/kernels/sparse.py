@@ -8,7 +8,6 @@ from pbcs_ompl.planners.kernels.bin_queue import BinQueue
 from pbcs_ompl.planners.kernels.cells import find_cell
 
 
-
 @njit()
 def draw_sparse(queue: BinQueue, reach: int, rng: np.random.Generator, nodes: NDArray[np.int64]) -> None:
     """Write into nodes [B] independent draws with probability proportional to 1 / (nodes in the bins around).
