@@ -2,7 +2,7 @@
 
     python tests/benchmarks/ex_speed.py [--quick]
 
-Transitions per second near 1e5, 1e6 and 1e7 nodes on a 15x15 maze whose goal is walled in, and bytes a node (bar: 110).
+Transitions per second near 1e5, 1e6 and 1e7 nodes on a 15x15 maze whose goal is walled in, and bytes a node (bar: 60).
 CPU seconds; each rate is the best of several slices, because other work on the machine can only lower it. How our
 planners compare with OMPL's is measured by native_ompl/bench.py.
 """
@@ -53,7 +53,7 @@ def growing_tree(name: str, size: int, sizes: list[int]) -> None:
         for nodes, best in rates.items():
             print(f"  rate near {nodes:>10,} nodes {best:>12,.0f} /s   {best / rates[sizes[0]]:.2f} of the first")
         print(f"  bytes a node: {(planner.tree.nbytes + planner.strategy.nbytes) / count:.0f} in arrays, "
-              f"{peak / count:.0f} of peak resident memory  (bar 110)")
+              f"{peak / count:.0f} of peak resident memory  (bar 60)")
 
 
 def grow(planner: Any, counter: Counter, nodes: int) -> None:
