@@ -71,7 +71,7 @@ def build_parser() -> Parser:
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
-    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _export):
+    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export):
         name, purpose = add.__name__.removeprefix("_"), add.__doc__ or ""
         verb = group.add_parser(name, help=purpose, description=purpose)
         add(verb)
@@ -224,6 +224,15 @@ def _report(verb: Parser) -> None:
     verb.add_argument("dir", metavar="DIR", help="a folder of results, or one that holds many, such as runs")
     verb.add_argument("--out", metavar="FILE",
                       help="the page (report.html in DIR); an older report is replaced, another file never")
+
+
+def _view(verb: Parser) -> None:
+    """show a plan or a training in three dimensions, as one HTML page with a slider for the time"""
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs plan or pbcs train")
+    verb.add_argument("--out", metavar="FILE",
+                      help="the page (view.html in DIR); an older view is replaced, another file never")
+    verb.add_argument("--open", action="store_true", help="open the page in the browser")
+    _add_trust(verb, "the folder")
 
 
 def _export(verb: Parser) -> None:
