@@ -121,6 +121,8 @@ class EpisodeSettings(Settings):
         beta: Episodes of a session and of a test ([Matheron2020] Alg. 7 and 8; 50 in chapter 7).
         epsilon: Fraction of random actions while collecting experience ([Matheron2020] chapter 7).
         test_epsilon: Fraction of random actions in tests ([Matheron2020]: 0).
+        first_trials: Episodes of a test that run before the others, which are left out where some of these fail, but
+            not all: only rates of 0 and 1 have a consequence ([Matheron2020]: 0, all run).
         max_steps: Longest episode of a skill, in steps ([Matheron2020] chapter 7).
         updates_per_transition: Gradient steps for each collected transition ([Matheron2020] Alg. 8).
         episodes_per_batch: Episodes that run side by side between updates ([Matheron2020] Alg. 8: 1).
@@ -131,6 +133,7 @@ class EpisodeSettings(Settings):
     beta: int = 50
     epsilon: float = 0.1
     test_epsilon: float = 0.0
+    first_trials: int = 0
     max_steps: int = 50
     updates_per_transition: float = 1.0
     episodes_per_batch: int = 1
@@ -139,6 +142,7 @@ class EpisodeSettings(Settings):
 
     def _check_ranges(self) -> None:
         self._check_counts("beta", "max_steps", "episodes_per_batch")
+        self._check("at least 0", lambda value: value >= 0, "first_trials")
         self._check_fractions("epsilon", "test_epsilon")
         self._check_positive("updates_per_transition")
 

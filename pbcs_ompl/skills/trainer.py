@@ -80,9 +80,21 @@ class SkillTrainer:
         return actions
 
     def test(self, index: int) -> float:
-        """Return the success rate of beta episodes from the ball of waypoint `index`."""
-        starts = self.waypoints.draw_starts(np.full(self.settings.beta, index), self.rng, self.counter)
-        return self._run(self.act, starts, self.settings.test_epsilon).success_rate
+        """Return the success rate of beta episodes from the ball of waypoint `index`.
+
+        It is that of the first `first_trials` of them where that is neither 0 nor 1: the others would not change this.
+        """
+        beta = self.settings.beta
+        first = min(self.settings.first_trials or beta, beta)
+        reached = self._tried(index, first)
+        if first < beta and len(np.unique(reached)) == 1:
+            reached = np.concatenate([reached, self._tried(index, beta - first)])
+        return float(reached.mean())
+
+    def _tried(self, index: int, count: int) -> BoolArray:
+        """Return which of `count` episodes from the ball of waypoint `index` succeed, without training."""
+        starts = self.waypoints.draw_starts(np.full(count, index), self.rng, self.counter)
+        return self._run(self.act, starts, self.settings.test_epsilon).reached
 
     def session(self, index: int, rehearsal_fraction: float = 0.0) -> float:
         """Train on beta episodes from the ball of waypoint `index`; return their success rate.

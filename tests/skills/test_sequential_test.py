@@ -48,6 +48,19 @@ def test_it_ends_with_the_most_trials() -> None:
     assert test.verdict(30, 30) is None
 
 
+def test_it_refuses_as_soon_as_successes_alone_would_not_be_accepted() -> None:
+    """It never takes a trial that cannot change the verdict, and no verdict differs from that of all trials."""
+    test = SequentialTest()
+    for failures in range(4):
+        for successes in range(test.most_trials - failures + 1):
+            trials = successes + failures
+            ahead = [test.verdict(successes + more, trials + more) for more in range(test.most_trials - trials + 1)]
+            if ahead[0] is None:
+                assert True in ahead
+                assert ahead.index(True) == test.most_needed(successes, trials)
+            assert ahead[0] is not False or True not in ahead
+
+
 def test_rates_have_an_order_and_errors_a_range() -> None:
     for changes in ({"refused_rate": 0.99, "accepted_rate": 0.9}, {"accepted_rate": 1.0}, {"false_refusals": 0.5},
                     {"most_trials": 0}):
