@@ -111,7 +111,12 @@ class PBCS:
     @property
     def standing(self) -> str:
         """How far training has come, in words."""
-        return f"{self.covered:.0%} of the plan covered"
+        covered = f"{self.covered:.0%} of the plan covered"
+        if self.complete:
+            return f"{covered}, but the chain does not pass its verification"
+        state, last = self.backplay.state, self.trainer.waypoints.last
+        return (f"{covered}; of the episodes that begin at {state.start / last:.0%} of it and are to end at "
+                f"{self.end / last:.0%}, {max(0.0, state.best):.0%} succeed in the best session")
 
     @property
     def longest_step(self) -> int:
