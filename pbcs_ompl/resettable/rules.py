@@ -11,6 +11,8 @@ from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rule_language import WORDS, Values, parse_conditions, parse_values
+from pbcs_ompl.resettable.simulation import simulation_of
+from pbcs_ompl.resettable.task_env import bare
 
 
 class Outcome(NamedTuple):
@@ -145,10 +147,10 @@ def _found(module: str, name: str) -> Any:
 
 
 def _simulated(env: Any) -> Any:
-    data = getattr(env, "data", None)
-    if not hasattr(data, "qpos"):
-        raise InvalidOption(f"{type(env).__name__} is no MuJoCo environment: it has neither qpos nor qvel")
-    return data
+    simulation = simulation_of(env)
+    if simulation is None:
+        raise InvalidOption(f"{type(bare(env)).__name__} is no MuJoCo environment: it has neither qpos nor qvel")
+    return simulation.data
 
 
 def _attribute(env: Any, name: str) -> Any:

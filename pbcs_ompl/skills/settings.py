@@ -123,7 +123,9 @@ class EpisodeSettings(Settings):
         test_epsilon: Fraction of random actions in tests ([Matheron2020]: 0).
         first_trials: Episodes of a test that run before the others, which are left out where some of these fail, but
             not all: only rates of 0 and 1 have a consequence ([Matheron2020]: 0, all run).
-        max_steps: Longest episode of a skill, in steps ([Matheron2020] chapter 7).
+        max_steps: Longest episode of a skill, in steps ([Matheron2020] chapter 7); 0 for the environment's limit.
+        steps_per_waypoint: Where this number times the waypoints from a start to the target is more than `max_steps`,
+            it is the limit instead, up to the environment's (ours; 0 for none).
         updates_per_transition: Gradient steps for each collected transition ([Matheron2020] Alg. 8).
         episodes_per_batch: Episodes that run side by side between updates ([Matheron2020] Alg. 8: 1).
         shaped: Train on the shaped reward ([Matheron2020] 7.2.3) instead of the environment's own.
@@ -135,23 +137,26 @@ class EpisodeSettings(Settings):
     test_epsilon: float = 0.0
     first_trials: int = 0
     max_steps: int = 50
+    steps_per_waypoint: float = 0.0
     updates_per_transition: float = 1.0
     episodes_per_batch: int = 1
     shaped: bool = True
     success_reward: float = 10.0
 
     def _check_ranges(self) -> None:
-        self._check_counts("beta", "max_steps", "episodes_per_batch")
-        self._check("at least 0", lambda value: value >= 0, "first_trials")
+        self._check_counts("beta", "episodes_per_batch")
+        self._check("at least 0", lambda value: value >= 0, "max_steps", "steps_per_waypoint",
+                    "first_trials")
         self._check_fractions("epsilon", "test_epsilon")
         self._check_positive("updates_per_transition")
 
 
 @dataclass(frozen=True)
 class StartSettings(Settings):
-    """Where episodes start: in a ball around a state.
+    """Where episodes start: in a ball around a state, or in that state.
 
     Attributes:
+        exact: Episodes start exactly in the state ([Matheron2020] chapter 5), else in the ball around it (7.2.4).
         radius: Radius of start balls, activation sets and local goals, in the environment's distance (epsilon of
             [Matheron2020] 7.2).
         reject_invalid: Draw again when a start state is invalid; [Matheron2020] keeps it.
@@ -159,6 +164,7 @@ class StartSettings(Settings):
             not be a state (ours, not tuned).
     """
 
+    exact: bool = False
     radius: float = 0.1
     reject_invalid: bool = True
     rollout_steps: int = 5

@@ -238,7 +238,7 @@ class Training:
     def _advice(self) -> str:
         """Return what to try when the budget is used up."""
         other = "pbcs" if self.config.method == "follow" else "follow"
-        return f"Try a larger budget (from the folder, with resume), another seed, another plan, or the method {other!r}"
+        return f"Try a larger budget (a folder can be resumed), another seed, another plan, or the method {other!r}"
 
     def _step(self, method: TrainingMethod) -> bool:
         """Make one step of the method; return whether the budget allowed it.

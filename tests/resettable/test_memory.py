@@ -14,9 +14,9 @@ pytest.importorskip("mujoco")
 
 from pbcs_ompl.core.errors import InvalidState, NotResettable
 from pbcs_ompl.resettable import adapt
+from pbcs_ompl.resettable.adapters.restorable import GUARD_EVERY
 from pbcs_ompl.resettable.branching import LONG, first_difference
 from pbcs_ompl.resettable.memory.code import names_of
-from pbcs_ompl.resettable.memory.memory import GUARD_EVERY
 from pbcs_ompl.resettable.memory.plain_values import enum_name, from_text, pack, same, size_for, to_text, unpack
 from tests.resettable.toys import Cart, Line, walk
 

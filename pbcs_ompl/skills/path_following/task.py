@@ -207,7 +207,7 @@ def around_last_progress(trail: Sequence[tuple[IndexArray, Position]], failed: B
     Args:
         trail: For each step, the executions that made it and where they were before it.
         failed: Which of the executions failed [B].
-        reach: Only up to so many steps before and after the last progress of each.
+        reach: The most steps before and after the last progress of each.
     """
     members, steps = (np.concatenate(parts) for parts in zip(*(
         (alive, np.full(len(alive), step)) for step, (alive, _) in enumerate(trail)), strict=True))
