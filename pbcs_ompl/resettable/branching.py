@@ -18,7 +18,7 @@ from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.observing import state_observer
 from pbcs_ompl.resettable.rewards import same_rewards
-from pbcs_ompl.resettable.rules import Outcome
+from pbcs_ompl.resettable.rules import Outcome, reported_success
 from pbcs_ompl.resettable.supported import TaskMaker
 
 SHORT, LONG = 12, 60
@@ -231,7 +231,7 @@ def _kept(value: Any) -> Any:
 def _success(env: Any, outcome: Outcome) -> bool:
     if isinstance(env, RestorableEnv):
         return env.is_success(outcome)
-    return bool(outcome.info.get("is_success", outcome.info.get("success", outcome.terminated)))
+    return reported_success(outcome)
 
 
 def _first_index(one: Any, other: Any) -> str | None:

@@ -101,8 +101,10 @@ def _refuse_random(env: Any, inner: Any, make_inner: TaskMaker) -> None:
         raise NotResettable(f"{_name(inner)} is not resettable: each instance of it is another environment, as if its "
                             f"constructor drew random numbers: with the same seed and actions, fresh instances differ "
                             f"in {found}; draw them in reset, or give the constructor a seed")
+    what = "resets" if found.endswith("at step 0") else "steps"
     raise NotResettable(f"{_name(inner)} is not resettable: the same actions from the same seed lead elsewhere, so its "
-                        f"steps are random: fresh instances differ in {found}; make the randomness part of its state")
+                        f"{what} are random, or depend on what is outside of it: fresh instances differ in {found}; "
+                        f"draw from self.np_random in reset, or make the randomness part of its state")
 
 
 def _warn(text: str) -> None:

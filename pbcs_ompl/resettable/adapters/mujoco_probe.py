@@ -7,6 +7,7 @@ from pbcs_ompl.resettable.adapters.mujoco_state import ModelParts, Physics, Read
 from pbcs_ompl.resettable.memory.exploration import SEEDS, episodes
 from pbcs_ompl.resettable.memory.memory import Memory
 from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.rules import SUCCESS
 from pbcs_ompl.resettable.simulation import Simulation
 
 PROBED = (0, 1, 12, 30)
@@ -65,8 +66,8 @@ class _Probe:
             observation, reward, terminated, truncated, info = self._simulation.env.step(copied(self._action))
         except Exception as error:  # an environment may refuse such numbers: then it reads them
             return [type(error).__name__.encode()]
-        success = bool(info.get("is_success", info.get("success", False)))
-        return [seen, flat(observation).tobytes(), np.array([reward, terminated, truncated, success], float).tobytes(),
+        success = repr([info.get(key) for key in SUCCESS]).encode()
+        return [seen, flat(observation).tobytes(), np.array([reward, terminated, truncated], float).tobytes(), success,
                 self._physics.save(self._simulation.model, self._simulation.data).tobytes(),
                 self._memory.save().tobytes()]
 

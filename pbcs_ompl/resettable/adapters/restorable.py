@@ -49,6 +49,8 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
     perturb_by_rollouts = True
     exploring = False
     """Whether steps are made only to see what range the feature has: no state of theirs is restored."""
+    largest = UNBOUNDED
+    """No number that is saved is larger."""
     goal_radius = 1.0
     """A state is a success if its distance to the goal is smaller, where the environment reports one."""
 
@@ -75,7 +77,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.exploring = False
         if self.bounds.narrow:
             warnings.warn(narrow_words(self.bounds), stacklevel=2)
-        rest = np.full(saved + 1, UNBOUNDED)
+        rest = np.full(saved + 1, self.largest)
         self.state_low = np.concatenate([self.bounds.low, -rest])
         self.state_high = np.concatenate([self.bounds.high, rest])
         self.reset(seed=0)

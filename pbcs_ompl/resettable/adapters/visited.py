@@ -25,13 +25,15 @@ from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rewards import same_rewards
 from pbcs_ompl.resettable.simulation import holds_compiled_model
 
-FIRST_HASH = float(2**32)
-"""Smaller numbers are seeds."""
+FIRST_HASH, LAST_HASH = float(2**32), float(2**53)
+"""Smaller numbers are seeds; up to the last, numbers of float64 are whole."""
 PROOF_STEPS = 20
 
 
 class VisitedEnv(RestorableEnv):
     """Names what was visited and finds it again; a subclass says how."""
+
+    largest = LAST_HASH
 
     def __init__(self, inner: Any, goal: Any = None, feature: Any = None):
         self._name = 0.0
@@ -191,9 +193,9 @@ class FreshEnv(ReplayedEnv):
 
 
 def child_hash(name: float, action: Array) -> float:
-    """Return the name of what follows a state under an action: a hash of both in [2**32, 2**53)."""
+    """Return the name of what follows a state under an action: a hash of both in [FIRST_HASH, LAST_HASH)."""
     digest = blake2b(struct.pack("<d", name) + np.ascontiguousarray(action).tobytes(), digest_size=8).digest()
-    return FIRST_HASH + float(int.from_bytes(digest, "little") % (2**53 - 2**32))
+    return FIRST_HASH + float(int.from_bytes(digest, "little") % int(LAST_HASH - FIRST_HASH))
 
 
 def copies_are_faithful(env: Any) -> bool:
