@@ -84,7 +84,7 @@ class Policy:
             other: The policy of q.
             share: Within [0, 1].
         """
-        layers = tuple(tuple((1.0 - np.float32(share)) * mine + np.float32(share) * its
+        layers = tuple(tuple(np.asarray((1.0 - share) * mine + share * its, dtype=np.float32)
                              for mine, its in zip(*pair, strict=True))
                        for pair in zip(self.layers, other.layers, strict=True))
         return Policy(layers, self.action_low, self.action_high)
