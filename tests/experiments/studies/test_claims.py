@@ -45,7 +45,7 @@ def test_p_values_are_those_of_fishers_test():
 
 
 def test_the_fewest_runs_have_the_power_that_is_claimed():
-    """By simulation: with this number of runs of each, rates that are WORTH apart are separated in four cases of five."""
+    """By simulation: with this number of runs, rates that are WORTH apart are separated in four cases of five."""
     runs, rng = fewest_runs(WORTH), np.random.default_rng(0)
     assert fewest_runs(0.2) > runs > fewest_runs(0.6)
     one, other = (rng.binomial(runs, 0.5 + way * WORTH / 2, 2000) for way in (1, -1))
