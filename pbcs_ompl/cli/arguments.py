@@ -11,6 +11,7 @@ from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
 EXECUTORS = ("local", "ray")
 SCHEDULERS = ("make", "slurm")
+TRACKERS = ("tensorboard", "wandb", "trackio")
 FORMATS = ("numpy", "onnx", "sb3", "minari", "maniskill", "planner-arena", "csv")
 DESCRIPTION = """\
 Plan with OMPL in any environment that can be reset,
@@ -71,7 +72,7 @@ def build_parser() -> Parser:
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
-    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export, _distill):
+    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export, _distill, _watch):
         name, purpose = add.__name__.removeprefix("_"), add.__doc__ or ""
         verb = group.add_parser(name, help=purpose, description=purpose)
         add(verb)
@@ -163,6 +164,8 @@ def _train(verb: Parser) -> None:
     verb.add_argument("--max-transitions", type=integer(1), metavar="N",
                       help="stop after N environment steps (10,000,000)")
     _add_out(verb)
+    verb.add_argument("--track", type=choice("tracker", TRACKERS), metavar="NAME",
+                      help="also write the progress for tensorboard, wandb or trackio")
     verb.add_argument("--resume", metavar="DIR", help="continue a training that was stopped")
     _add_trust(verb, "the folder of --resume")
 
@@ -259,6 +262,12 @@ def _distill(verb: Parser) -> None:
     _add_seed(verb)
     _add_out(verb)
     _add_trust(verb, "the folder")
+
+
+def _watch(verb: Parser) -> None:
+    """show the progress of a training of another process until it ends"""
+    verb.add_argument("dir", metavar="DIR", help="the folder of pbcs train")
+    verb.add_argument("--once", action="store_true", help="show the present state and end")
 
 
 def _add_execution(verb: Parser) -> None:

@@ -1,6 +1,7 @@
 """`pbcs train`: plan a trajectory, train a chain of skills along it, draw both."""
 
 from argparse import Namespace
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,13 @@ from pbcs_ompl.resettable import make
 from pbcs_ompl.results.command_line import command, eval_words, resume_words
 from pbcs_ompl.results.files import CHAIN, CONFIG, TRAJECTORY
 from pbcs_ompl.results.folder import RunFolder, read_config, read_folder
+from pbcs_ompl.results.trackers import tracker
 from pbcs_ompl.skills import TrainResult, resume, train
 from pbcs_ompl.skills.load_chain import load_chain
 from pbcs_ompl.skills.trained_controller import TrainedController
+
+SHOWN = ("phase", "transitions", "updates", "covered", "skills", "seconds", "table")
+"""Of the numbers of a training; progress.csv and trackers have all."""
 
 
 def run(arguments: Namespace) -> int:
@@ -57,22 +62,29 @@ def run(arguments: Namespace) -> int:
 
 def _train(arguments: Namespace, out: Path) -> TrainResult:
     budget = {} if arguments.max_transitions is None else {"max_transitions": arguments.max_transitions}
-    with ProgressDisplay("train", budget=arguments.max_transitions) as display:
+    tracked = nullcontext() if arguments.track is None else tracker(arguments.track, out)
+    with tracked as track, ProgressDisplay("train", budget=arguments.max_transitions) as display:
+
+        def show(numbers: dict[str, Any]) -> None:
+            display({name: value for name, value in numbers.items() if name in SHOWN})
+            if track is not None:
+                track(numbers)
+
         if arguments.resume:
-            return resume(out, trust=arguments.trust, on_progress=display, **budget)
+            return resume(out, trust=arguments.trust, on_progress=show, **budget)
         trajectory = None if arguments.path is None else _read_trajectory(Path(arguments.path))
         return train(environment(arguments), trajectory=trajectory, out=out,
                      method=arguments.method, planner=arguments.planner, planner_kwargs=arguments.planner_kwargs,
                      agent=arguments.agent, preset=arguments.preset, settings=arguments.settings,
                      agent_settings=arguments.agent_settings, seed=arguments.seed, device=arguments.device,
-                     on_progress=display, **budget)
+                     on_progress=show, **budget)
 
 
 def _refuse_other_options(arguments: Namespace) -> None:
     """A resumed run has the settings of its folder; only its budget may change."""
     defaults = vars(build_parser().parse_args(["train"]))
     for name, value in vars(arguments).items():
-        if name not in ("resume", "trust", "json", "max_transitions") and value != defaults[name]:
+        if name not in ("resume", "trust", "json", "max_transitions", "track") and value != defaults[name]:
             raise InvalidOption(f"--resume takes every setting but --max-transitions from "
                                 f"{arguments.resume}; remove --{name.replace('_', '-')}")
 

@@ -44,6 +44,8 @@ class SkillTrainer:
         self.updates_before = 0
         self.agent_seed = int(rng.integers(2**31))
         self.agent = make_agent(self.agent_seed)
+        self.latest: dict[str, float] = {}
+        """Where the last session started, its success rate, and the losses of its updates: for those who look on."""
         self.set_target(waypoints.last)
 
     def set_target(self, end_index: int, target: Target | None = None) -> None:
@@ -132,6 +134,7 @@ class SkillTrainer:
                                  episodes.terminals)
             self.train(episodes.transitions)
             successes += episodes.reached.sum()
+        self.latest |= {"start": int(indices.min()), "success_rate": float(successes / len(indices))}
         return float(successes / len(indices))
 
     def add_transitions(self, states: Array, controls: Array, rewards: Array, next_states: Array,
@@ -232,5 +235,6 @@ class SkillTrainer:
         self.updates_due += transitions * self.settings.updates_per_transition
         whole = int(self.updates_due)
         self.updates_due -= whole
-        if whole:
-            self.agent.train(whole)
+        losses = self.agent.train(whole) if whole else None
+        if isinstance(losses, dict):  # agents of others need not return any
+            self.latest |= {name: float(values[0]) for name, values in losses.items() if name.endswith("_loss")}

@@ -24,6 +24,7 @@ from pbcs_ompl.resettable.task import Task
 from pbcs_ompl.results.checksums import write_summed_json
 from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import RunFolder
+from pbcs_ompl.results.progress import PROGRESS, ProgressLog
 from pbcs_ompl.results.provenance import planning_versions
 from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.config import METHODS, TrainConfig
@@ -116,6 +117,7 @@ class Training:
         self.seeds = SeedTree(config.seed)
         self.began = time.perf_counter()
         self.next_checkpoint = self.began + FIRST_CHECKPOINT_SECONDS
+        self.log: ProgressLog | None = None
         self.undone = 0
         """Transitions of a step that was undone because the budget ended in it."""
 
@@ -141,6 +143,8 @@ class Training:
         if self.folder and not self.resumed:
             self.folder.write_config({"kind": "train", **self.config.to_dict(),
                                       "environment": self.model.spec.to_dict(), "versions": training_versions()})
+        if self.path:
+            self.log = ProgressLog(self.path / PROGRESS)
         trajectory, planned, failure = self._plan(trajectory)
         if failure is not None and isinstance(self.settings, PlannedSettings):
             return self._finish(None, trajectory, planned, failure)
@@ -269,6 +273,8 @@ class Training:
     def _finish(self, method: TrainingMethod | None, trajectory: Trajectory | None, planned: int,
                 ended_early: str | None) -> TrainResult:
         seconds = time.perf_counter() - self.began
+        if method is not None:
+            self._report(method, last=True)
         chain = None if method is None else method.chain(self.settings.steps_per_skill)
         outcome = _Outcome(ended_early, None, None, None) if ended_early else self._judge(chain, trajectory)
         result = TrainResult(
@@ -311,21 +317,30 @@ class Training:
             (path / CHECKPOINT).unlink(missing_ok=True)
 
     def _report_planning(self, numbers: dict[str, Any]) -> None:
+        if self.log:
+            self.log({"phase": "plan", **numbers})
         if self.on_progress:
             self.on_progress({"phase": "plan", **numbers})
 
-    def _report(self, method: TrainingMethod) -> None:
-        if self.on_progress is None:
+    def _report(self, method: TrainingMethod, *, last: bool = False) -> None:
+        numbers = self._numbers(method)
+        if self.log:
+            self.log(numbers, last=last)
+        if self.on_progress is None or last:
             return
-        trainer = method.trainer
         try:
             with code_of_others("on_progress"):
-                self.on_progress({"phase": "train", "transitions": trainer.counter.count, "updates": trainer.updates,
-                                  "covered": method.covered, "skills": len(method.skills),
-                                  "seconds": time.perf_counter() - self.began})
+                self.on_progress(numbers)
         except KeyboardInterrupt:  # a caller may end a training from here
             self._checkpoint(method)
             raise
+
+    def _numbers(self, method: TrainingMethod) -> dict[str, Any]:
+        """Return how far training has come, as plain numbers."""
+        trainer = method.trainer
+        return {"phase": "train", "transitions": trainer.counter.count, "updates": trainer.updates,
+                "covered": method.covered, "skills": len(method.skills), **trainer.latest,
+                "seconds": time.perf_counter() - self.began}
 
 
 def training_versions() -> dict[str, str]:
