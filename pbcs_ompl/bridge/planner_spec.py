@@ -74,6 +74,11 @@ class PlannerSpec:
         except (Exception, SystemExit) as error:
             raise callback_failed(error, f"the planner {self.name!r}") from error
 
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """Every option with its default; None where OMPL, the problem or nothing decides it."""
+        return dict(self._defaults)
+
     def settings(self, planner: Any) -> dict[str, Any]:
         """Return every option with the value in use, once `planner`, which this spec built, has solved.
 

@@ -15,13 +15,15 @@ from typing import Any
 
 from pbcs_ompl.cli.arguments import build_parser, parse
 from pbcs_ompl.cli.streams import OutputClosed, flush_output, print_error, survive_encodings
-from pbcs_ompl.core.errors import PbcsError
+from pbcs_ompl.core.errors import MissingDependency, PbcsError
 from pbcs_ompl.core.formatting import one_line
 from pbcs_ompl.core.signals import interruptible, signal_of, signals_interrupt
 from pbcs_ompl.core.trust import module_names
 
 MOST_LETTERS = 100
 """Of a name that is shown."""
+OF_TRAINING = ("torch", "safetensors")
+"""Libraries that only training and what it leads to need."""
 WRONG_INPUT, OUR_MISTAKE, STOPPED, SIGPIPE = 2, 4, 128, 13
 
 
@@ -68,10 +70,19 @@ def _dispatch(words: list[str]) -> int:
 
 
 def _import(verb: str) -> ModuleType:
-    """Return the module of a verb; a signal waits, since an exception within an import of OMPL ends the process."""
+    """Return the module of a verb; a signal waits, since an exception within an import of OMPL ends the process.
+
+    Raises:
+        MissingDependency: it needs what only training needs, and that is not installed.
+    """
     stops: list[KeyboardInterrupt] = []
     with interruptible(stops.append):
-        module = import_module(f"pbcs_ompl.cli.{verb}")
+        try:
+            module = import_module(f"pbcs_ompl.cli.{verb}")
+        except ModuleNotFoundError as error:
+            if error.name not in OF_TRAINING:
+                raise
+            raise MissingDependency(f'pbcs {verb} needs {error.name}: pip install "pbcs-ompl[rl]"') from error
     if stops:
         raise stops[0]
     return module

@@ -72,7 +72,8 @@ def build_parser() -> Parser:
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
-    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export, _distill, _watch):
+    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export, _distill, _watch,
+                _planners, _agents, _settings, _demo):
         name, purpose = add.__name__.removeprefix("_"), add.__doc__ or ""
         verb = group.add_parser(name, help=purpose, description=purpose)
         add(verb)
@@ -268,6 +269,28 @@ def _watch(verb: Parser) -> None:
     """show the progress of a training of another process until it ends"""
     verb.add_argument("dir", metavar="DIR", help="the folder of pbcs train")
     verb.add_argument("--once", action="store_true", help="show the present state and end")
+
+
+def _planners(verb: Parser) -> None:
+    """list the planners, their options with defaults, and what they mean"""
+    verb.add_argument("name", nargs="?", metavar="NAME", help="one of them, or module:attribute (all)")
+
+
+def _agents(verb: Parser) -> None:
+    """list the agents, their settings with defaults, and what they mean"""
+    verb.add_argument("name", nargs="?", metavar="NAME", help="one of them, or module:Class (all)")
+    verb.add_argument("--preset", default="fast", metavar="NAME", help="whose values are shown (fast)")
+
+
+def _settings(verb: Parser) -> None:
+    """list the settings of a preset for a training method, and what they mean"""
+    verb.add_argument("preset", nargs="?", default="fast", metavar="PRESET", help="fast or thesis (fast)")
+    verb.add_argument("--method", default="pbcs", metavar="NAME", help="the training method (pbcs)")
+
+
+def _demo(verb: Parser) -> None:
+    """plan in a 5x5 maze, train a chain of skills along the plan, show the result"""
+    _add_out(verb)
 
 
 def _add_execution(verb: Parser) -> None:

@@ -6,6 +6,7 @@ import sys
 from argparse import Namespace
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 from platform import platform, python_version
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.cli.arguments import environment
 from pbcs_ompl.cli.busy import Busy
+from pbcs_ompl.cli.lists import MISSING_TORCH
 from pbcs_ompl.cli.models import describe
 from pbcs_ompl.cli.terminal import print_summary
 from pbcs_ompl.core.errors import InvalidOption, PbcsError
@@ -36,7 +38,7 @@ def run(arguments: Namespace) -> int:
     missing = [name for name in NEEDED if versions[name] is None]
     result: dict[str, Any] = {
         "platform": platform(), "versions": versions, "missing": missing, "problems": bad_pairs(versions),
-        "compiler": find_compiler(), "planners": _planners(), "agents": names("agent"),
+        "compiler": find_compiler(), "planners": _planners(), "agents": _agents(),
         "environments": _environments(),
         "environment": _check(arguments) if arguments.env else None,
     }
@@ -111,6 +113,12 @@ def _planners() -> dict[str, str]:
     return states
 
 
+def _agents() -> dict[str, str]:
+    """Return for each registered agent "ready", or what skill training lacks here; torch is not imported to see it."""
+    lacking = [name for name in ("torch", "safetensors") if find_spec(name) is None]
+    return dict.fromkeys(names("agent"), MISSING_TORCH if lacking else "ready")
+
+
 def _smallest_problem() -> Any:
     """Return the space information of a problem in the plane, for planners to be built on."""
     from ompl import base as ob
@@ -153,7 +161,9 @@ def _closing_lines(result: dict[str, Any]) -> list[tuple[str, str]]:
     ready = [name for name, state in result["planners"].items() if state == "ready"]
     lines.append(("planners", ", ".join(ready)))
     lines += [("", f"{name}: {state}") for name, state in result["planners"].items() if state != "ready"]
-    lines += [("agents", ", ".join(result["agents"])), ("envs", ", ".join(result["environments"]))]
+    able = [name for name, state in result["agents"].items() if state == "ready"]
+    lines.append(("agents", ", ".join(able) or f"none can train here: each {MISSING_TORCH}"))
+    lines += [("envs", ", ".join(result["environments"]))]
     if result["environment"] is not None:
         checks = result["environment"]["checks"]
         verdict = "is resettable" if result["environment"]["ok"] else "is NOT resettable"
