@@ -144,10 +144,9 @@ class Tree:
 
     def path_to(self, node: int) -> IndexArray:
         """Return the nodes from a root to `node`, both included."""
-        parents = self.columns.parents
-        path = [int(node)]
-        while parents[path[-1]] >= 0:
-            path.append(int(parents[path[-1]]))
+        parent_of, path = self.columns.parents.item, [int(node)]
+        while (parent := parent_of(path[-1])) >= 0:
+            path.append(parent)
         return np.array(path[::-1], dtype=np.int64)
 
     def __getstate__(self) -> dict[str, Any]:
