@@ -10,7 +10,7 @@ from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 GROWTH = 4
 """Rows that were never written to cost address space, but no memory; copies cost both memory and time."""
 FIRST_ROWS = 1 << 14
-MOST_RESERVED = 1 << 30
+MOST_RESERVED = 1 << 31
 """Bytes of address space that a tree may reserve in advance."""
 
 
