@@ -71,7 +71,7 @@ def build_parser() -> Parser:
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
-    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export):
+    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export, _distill):
         name, purpose = add.__name__.removeprefix("_"), add.__doc__ or ""
         verb = group.add_parser(name, help=purpose, description=purpose)
         add(verb)
@@ -206,6 +206,8 @@ def _study(verb: Parser) -> None:
     verb.add_argument("id", nargs="?", metavar="ID", help="a study of --list, or the folder of one")
     verb.add_argument("--list", action="store_true", help="list the studies and what they are about")
     verb.add_argument("--seeds", type=integer(1), metavar="N", help="how many seeds (as the study says)")
+    verb.add_argument("--from-records", action="store_true",
+                      help="make no run: draw the figures from the records that come with the study")
     verb.add_argument("--device", metavar="NAME", help="where agents learn: cpu or cuda (as the study says)")
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="kill a run that takes longer")
     verb.add_argument("--max-memory", type=integer(1), metavar="MB", help="kill a run whose process holds more")
@@ -245,6 +247,16 @@ def _export(verb: Parser) -> None:
                       help="probability of a random action in each step of these (0)")
     verb.add_argument("--seed", type=integer(0), default=0, metavar="N", help="seed of the random actions (0)")
     verb.add_argument("--path", metavar="DIR", help="of a follower: the plan whose line it begins with")
+    _add_out(verb)
+    _add_trust(verb, "the folder")
+
+
+def _distill(verb: Parser) -> None:
+    """train one network to do what a chain of skills does"""
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train")
+    verb.add_argument("--settings", type=json_object, default={}, metavar="JSON",
+                      help="settings that differ from the defaults, such as '{\"width\": 64}'")
+    _add_seed(verb)
     _add_out(verb)
     _add_trust(verb, "the folder")
 
