@@ -14,7 +14,7 @@ from pbcs_ompl.bridge.coverage import Coverage, TransitionRecorder
 from pbcs_ompl.bridge.planner_spec import PlannerSpec, as_batch_planner
 from pbcs_ompl.bridge.problem import CallbackState, Problem, make_problem
 from pbcs_ompl.bridge.termination import Limits, checked_limits, make_stop
-from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory
+from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory, trajectory_of
 from pbcs_ompl.bridge.tree import load_tree, save_tree, tree_of
 from pbcs_ompl.bridge.verification import Verification, verify
 from pbcs_ompl.core.callbacks import code_of_others
@@ -222,7 +222,7 @@ def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
     callbacks.raise_error()
     with code_of_others(f"the planner {spec.name!r}"):
         tree = tree_of(planner, problem.space_information)
-        return _Found(_solution(problem, spec, seed), tree, spec.settings(planner), seconds)
+        return _Found(_solution(problem, batch_planner, spec, seed), tree, spec.settings(planner), seconds)
 
 
 def _keep_error(planner: BatchPlanner, callbacks: CallbackState) -> None:
@@ -232,13 +232,16 @@ def _keep_error(planner: BatchPlanner, callbacks: CallbackState) -> None:
         callbacks.fail(error)
 
 
-def _solution(problem: Problem, spec: PlannerSpec, seed: int) -> Trajectory | None:
+def _solution(problem: Problem, planner: BatchPlanner | None, spec: PlannerSpec, seed: int) -> Trajectory | None:
     """Return the planner's path if it ends in the goal: planners also report approximate ones."""
     setup, model = problem.setup, problem.model
     if not setup.haveExactSolutionPath():
         return None
-    trajectory = to_trajectory(setup.getSolutionPath(), problem.space_information, model, planner=spec.name,
-                               seed=seed, reset_seed=model.spec.reset_seed(seed))
+    source = {"planner": spec.name, "seed": seed, "reset_seed": model.spec.reset_seed(seed)}
+    if planner is not None and planner.tree is not None and planner.solution is not None:
+        trajectory = trajectory_of(planner.tree, planner.solution, model, **source)
+    else:
+        trajectory = to_trajectory(setup.getSolutionPath(), problem.space_information, model, **source)
     reached = model.goal_distance(trajectory.states[-1:])[0] < model.goal_threshold
     return trajectory if reached else None
 
