@@ -49,7 +49,7 @@ def _cached(function: Function, *signature: Any, **options: Any) -> Function:
     function.__qualname__ = f"{name}-{kernel_digest()}"
     try:
         with no_collection():  # the first one loads the half of Numba
-            compiled: Function = numba.njit(*signature, cache=True, **options)(function)
+            compiled: Function = numba.njit(*signature, cache=True, no_cfunc_wrapper=True, **options)(function)
     finally:
         function.__qualname__ = name
     return compiled
