@@ -33,7 +33,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     survive_encodings()
     with warnings.catch_warnings():
         warnings.showwarning = _warn
-        return _run(words)
+        try:
+            return _run(words)
+        finally:
+            gc.unfreeze()  # else OMPL's bindings list all that they hold as leaked at exit
 
 
 def _run(words: list[str]) -> int:

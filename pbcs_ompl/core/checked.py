@@ -83,8 +83,7 @@ def _test_of(hint: Any) -> Callable[[Any], bool]:
         return lambda value: isinstance(value, origin) and all(
             fits(key, parameters[0]) and fits(item, parameters[1]) for key, item in value.items())
     if origin is not None and issubclass(origin, Sequence) and origin is not tuple:
-        return lambda value: (isinstance(value, (origin, *_of_numpy("ndarray"))) and not isinstance(value, str | bytes)
-                              and all(fits(item, parameters[0]) for item in value))
+        return lambda value: _is_list(value, origin) and all(fits(item, parameters[0]) for item in value)
     return lambda value: _has_class(value, origin or hint)
 
 
@@ -97,6 +96,10 @@ def _has_class(value: Any, kind: Any) -> bool:
     if kind is bool:
         return _is_bool(value)
     return isinstance(value, kind)
+
+
+def _is_list(value: Any, kind: type) -> bool:
+    return isinstance(value, (kind, *_of_numpy("ndarray"))) and not isinstance(value, str | bytes)
 
 
 def _is_bool(value: Any) -> bool:

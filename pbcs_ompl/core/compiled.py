@@ -10,10 +10,12 @@ from typing import Any, TypeVar
 
 import numba
 
+from pbcs_ompl.core.announcement import announce
 from pbcs_ompl.core.collector import no_collection
 from pbcs_ompl.core.scratch import scratch_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+announce()
 
 
 def njit(*signature: Any, **options: Any) -> Callable[[Function], Function]:
