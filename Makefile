@@ -11,7 +11,7 @@ STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test slow stress check bench clean
+.PHONY: help setup demo test slow stress check bench docs clean
 
 help:
 	@echo "make demo    install, train a skill chain on a 5x5 maze, show the result"
@@ -20,6 +20,7 @@ help:
 	@echo "make stress  kills, damaged files, bad inputs: half an hour"
 	@echo "make check   lint, types, direction of imports"
 	@echo "make bench   measure what the README's table states (takes long)"
+	@echo "make docs    the documentation as a site, in docs/_build"
 	@echo "make setup   only prepare $(VENV)"
 
 setup: $(STAMP)
@@ -54,5 +55,10 @@ check: setup
 bench: setup
 	@for script in tests/benchmarks/*.py tests/benchmarks/native_ompl/bench.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
+docs: setup
+	@$(BIN)/python -c 'import sphinx' 2>/dev/null || $(BIN)/python -m pip install --quiet $(PIP_ARGS) -c constraints.txt -e '.[docs]'
+	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build
+	@echo "docs/_build/index.html"
+
 clean:
-	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf build dist docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,4 +1,4 @@
-"""The environments of the thesis, registered with Gymnasium as `pbcs/...` when this package is imported.
+"""The environments of the thesis, a car and a quadrotor: registered as `pbcs/...` when this package is imported.
 
 Importing is light: the entry points are strings, so that numba, FCL and MuJoCo are loaded by `gymnasium.make` only.
 """
@@ -11,6 +11,8 @@ ENTRY_POINTS = {
     "pbcs/Disc-v0": "pbcs_ompl.envs.box_disc:DiscEnv",
     "pbcs/Toy1D-v0": "pbcs_ompl.envs.line_env:Toy1DEnv",
     "pbcs/Drift-v0": "pbcs_ompl.envs.line_env:DriftEnv",
+    "pbcs/CarPark-v0": "pbcs_ompl.envs.car_park:CarParkEnv",
+    "pbcs/PlanarQuadrotor-v0": "pbcs_ompl.envs.planar_quadrotor:PlanarQuadrotorEnv",
     "pbcs/AntMaze-v0": "pbcs_ompl.envs.ant_maze:AntMazeEnv",
     "pbcs/SparseHalfCheetah-v0": "pbcs_ompl.envs.sparse_half_cheetah:SparseHalfCheetahEnv",
 }

@@ -55,6 +55,23 @@ class WallsFcl:
             inside[k] = self._collides(self._point)
         return inside
 
+    def overlaps(self, poses: Array, half_edges: tuple[float, float]) -> BoolArray:
+        """Return which rectangles overlap a wall [B].
+
+        Args:
+            poses: Centres and angles [B, 3] (x, y, angle).
+            half_edges: Half of their edges, along the angle and across.
+        """
+        along, across = half_edges
+        body = fcl.CollisionObject(fcl.Box(2 * SCALE * along, 2 * SCALE * across, SCALE), fcl.Transform())
+        found = np.empty(len(poses), dtype=np.bool_)
+        for k, (x, y, angle) in enumerate(poses.tolist()):
+            c, s = np.cos(angle), np.sin(angle)
+            body.setTransform(fcl.Transform(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]),
+                                            np.array([SCALE * x, SCALE * y, 0.0])))
+            found[k] = self._collides(body)
+        return found
+
     def hit_by(self, starts: Array, ends: Array) -> BoolArray:
         """Return which segments from starts [B, 2] to ends [B, 2] touch a wall [B]."""
         return np.array([self.segment_hits(p, q) for p, q in zip(starts, ends, strict=True)], dtype=np.bool_)

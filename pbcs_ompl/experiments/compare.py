@@ -76,7 +76,7 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
 
     Args:
         planners: Registered names or `module:attribute`, which other processes have to find; or their options by name.
-        env: An environment or several: ids, `EnvSpec`s, and Gymnasium environments or models of a registered id.
+        env: An environment or several: ids, `EnvSpec` objects, and Gymnasium environments or models of a registered id.
         env_kwargs: Options of ids: as many as there are environments, or one of either for all of the other.
         goal, feature, start_seed, reset_options: Rules of all environments; see `pbcs_ompl.make`.
         seeds: How many seeds (0, 1, ...), or the seeds.

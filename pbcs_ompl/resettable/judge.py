@@ -6,6 +6,7 @@ search and agents train, has no part in it.
 
 import math
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -151,7 +152,7 @@ class _Episode:
         self.ending: Ending | None = None
         self._rewards: list[float] = []
         with code_of_others("the environment"):
-            observation, info = env.reset(seed=spec.reset_seed(reset_seed), options=spec.reset_options)
+            observation, info = env.reset(seed=spec.reset_seed(reset_seed), options=deepcopy(spec.reset_options))
             self._bare = env.unwrapped
             outcome = Outcome(self._bare, observation, math.nan, False, info)
             if rule(outcome):

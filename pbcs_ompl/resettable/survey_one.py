@@ -1,6 +1,7 @@
 """One environment of the survey, in this process: `python -m pbcs_ompl.resettable.survey_one MODULE:ID FILE`."""
 
 import os
+import resource
 import sys
 import threading
 import time
@@ -13,7 +14,8 @@ from pbcs_ompl.core.errors import MissingDependency, NotResettable, PbcsError, U
 from pbcs_ompl.resettable.adapters.visited import VisitedEnv
 from pbcs_ompl.resettable.check import check_resettable
 from pbcs_ompl.resettable.make import make
-from pbcs_ompl.resettable.survey import Record, nothing
+from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes
+from pbcs_ompl.resettable.survey import MEMORY, OUT_OF_MEMORY, Record, nothing
 from pbcs_ompl.results.files import write_json
 
 STATES = 20
@@ -35,9 +37,11 @@ def _classify(env_id: str) -> Record:
     except (NotResettable, UnsupportedSpace) as error:
         return nothing("refused", str(error))
     except PbcsError as error:
-        return nothing("failed", str(error))
+        return nothing("not installed" if isinstance(error.__cause__, ImportError) else "failed", str(error))
     except ModuleNotFoundError as error:
         return nothing("not installed", str(error))
+    except MemoryError:
+        return nothing("failed", OUT_OF_MEMORY)
     except Exception as error:  # a foreign environment may raise anything: a finding of the survey
         return nothing("failed", f"{type(error).__name__}: {error}")
     report = check_resettable(model)
@@ -47,7 +51,17 @@ def _classify(env_id: str) -> Record:
              "restore_us": None if wrong else restore_cost(model)}
     if wrong:
         return {"verdict": "failed", "why": f"{wrong[0].name}: {wrong[0].detail}", **found}
-    return {"verdict": "visited only" if visited else "exact", "why": "", **found}
+    if not visited:
+        return {"verdict": "exact", "why": "", **found}
+    return {"verdict": "visited only", "why": randomness(model.env.inner), **found}
+
+
+def randomness(env: Any) -> str:
+    """Return what is to be said of an environment whose steps draw random numbers; nothing of another one."""
+    changes = Changes(env)
+    for event in episodes(env, SEEDS[:1], STATES):
+        changes.add(event)
+    return f"steps draw random numbers from {changes.random}: a plan holds for one seed" if changes.random else ""
 
 
 def restore_cost(model: Any) -> float:
@@ -85,4 +99,5 @@ def _end_with_parent() -> None:
 
 if __name__ == "__main__":
     _end_with_parent()
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     write_json(Path(sys.argv[2]), classify(sys.argv[1]))

@@ -8,6 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = {
+    "moving_picture.py": (["2"], "114 frames"),
     "plan_a_maze.py": ([], "it replays exactly: True"),
     "compare_planners.py": (["2"], "KPIECE1"),
     "train_a_skill_chain.py": ([], "success with 0% random actions: 100%"),

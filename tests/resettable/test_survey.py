@@ -31,6 +31,12 @@ def test_verdicts(env_id: str, verdict: str, why: str) -> None:
     assert (record["restore_us"] is not None) == (verdict == "exact")
 
 
+def test_randomness_of_steps_is_said() -> None:
+    record = classify("FrozenLake-v1")
+    assert (record["verdict"], record["adapter"]) == ("visited only", "CopiedEnv")
+    assert record["why"] == "steps draw random numbers from np_random: a plan holds for one seed"
+
+
 def test_a_survey_continues_where_it_ended(tmp_path: Path) -> None:
     path = tmp_path / "environments.json"
     seen: list[str] = []
