@@ -37,6 +37,8 @@ def _classify(env_id: str) -> Record:
     except (NotResettable, UnsupportedSpace) as error:
         return nothing("refused", str(error))
     except PbcsError as error:
+        if isinstance(error.__cause__, MemoryError):
+            return nothing("failed", OUT_OF_MEMORY)
         return nothing("not installed" if isinstance(error.__cause__, ImportError) else "failed", str(error))
     except ModuleNotFoundError as error:
         return nothing("not installed", str(error))

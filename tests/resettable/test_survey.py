@@ -60,6 +60,22 @@ def test_what_takes_too_long_is_killed_and_said(tmp_path: Path) -> None:
     assert (record["verdict"], record["why"]) == ("failed", "not done after 0.05 s")
 
 
+def test_what_takes_too_much_memory_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "hungry.py").write_text("""
+import gymnasium, numpy as np
+
+class Hungry(gymnasium.Env):
+    def __init__(self):
+        self.much = np.zeros(2**30)
+
+gymnasium.register("Hungry-v0", Hungry)
+""")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=":")
+    monkeypatch.setattr("pbcs_ompl.resettable.survey.package_version", lambda module: module)
+    record, = survey({"Hungry-v0": "hungry"}, tmp_path / "found.json")
+    assert (record["verdict"], record["why"]) == ("failed", "needs more than 6 GiB of memory")
+
+
 def test_the_page_counts_and_quotes() -> None:
     common = {"package": "toys", "version": "toys 1.0", "seconds": 0.1}
     records: list[Record] = [
