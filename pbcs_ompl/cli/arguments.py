@@ -71,7 +71,7 @@ def build_parser() -> Parser:
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
-    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export):
+    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export, _distill):
         name, purpose = add.__name__.removeprefix("_"), add.__doc__ or ""
         verb = group.add_parser(name, help=purpose, description=purpose)
         add(verb)
@@ -248,6 +248,16 @@ def _export(verb: Parser) -> None:
                       help="probability of a random action in each step of these (0)")
     verb.add_argument("--seed", type=integer(0), default=0, metavar="N", help="seed of the random actions (0)")
     verb.add_argument("--path", metavar="DIR", help="of a follower: the plan whose line it begins with")
+    _add_out(verb)
+    _add_trust(verb, "the folder")
+
+
+def _distill(verb: Parser) -> None:
+    """train one network to do what a chain of skills does"""
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train")
+    verb.add_argument("--settings", type=json_object, default={}, metavar="JSON",
+                      help="settings that differ from the defaults, such as '{\"width\": 64}'")
+    _add_seed(verb)
     _add_out(verb)
     _add_trust(verb, "the folder")
 
