@@ -136,5 +136,5 @@ def weighted_mean(controls: Array, costs: Array, temperature: float) -> Array:
         best: Array = controls[costs.argmin()]
         return best
     weights = np.exp(-(costs - costs.min()) / temperature)
-    mean: Array = np.tensordot(weights / weights.sum(), controls, axes=1)
+    mean: Array = (weights[:, None, None] * controls).sum(axis=0) / weights.sum()
     return mean

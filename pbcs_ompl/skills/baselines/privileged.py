@@ -1,7 +1,7 @@
 """Executions of controllers that read the simulator's state, which no robot can."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
@@ -43,11 +43,11 @@ def evaluate_privileged(make_controller: MakeController, env: EnvSpec, *, reset_
     """
     check_range("episodes", episodes, 1 <= episodes <= MOST_EPISODES, f"from 1 to {MOST_EPISODES}")
     check_range("epsilon", epsilon, 0 <= epsilon <= 1, "within [0, 1]")
-    driven = _LeftOpen(make(env).env)
-    judge = Judge(env, lambda: driven)
+    driven = make(env).env
+    judge = Judge(env, lambda: _LeftOpen(driven))
 
     def read_state() -> Array:
-        return np.array(driven.env.get_env_state(), dtype=np.float64)
+        return np.array(driven.get_env_state(), dtype=np.float64)
 
     seeds = SeedTree(seed).child("privileged")
     executions = [execution for index in range(episodes) for execution in judge.drive(
@@ -56,7 +56,7 @@ def evaluate_privileged(make_controller: MakeController, env: EnvSpec, *, reset_
     return Evaluation.of(executions, epsilon)
 
 
-class _LeftOpen(gymnasium.Wrapper):  # type: ignore[type-arg]
+class _LeftOpen(gymnasium.Wrapper[Any, Any, Any, Any]):
     """An environment that is driven again after the judge has closed it."""
 
     def close(self) -> None:

@@ -25,7 +25,7 @@ from pbcs_ompl.skills.baselines import (
 PRIVILEGED = ("mppi",)
 TIMED_STEPS = 200
 """Most actions over which the milliseconds of one are averaged."""
-RULES = ("goal", "max_episode_steps")
+RULES = ("goal", "feature", "max_episode_steps")
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
