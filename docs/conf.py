@@ -8,7 +8,7 @@ copyright = "2026, the pbcs_ompl developers"
 version = release = version_of("pbcs-ompl")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode", "sphinx_copybutton"]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "paper"]
 html_theme = "furo"
 html_title = "pbcs_ompl"
 html_static_path = []

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from pbcs_ompl.experiments.compare import Comparison, compare
     from pbcs_ompl.experiments.run_study import StudyResult, run_study
     from pbcs_ompl.resettable import ResetReport, check_resettable, make
+    from pbcs_ompl.results.export import Export, export
     from pbcs_ompl.results.report import Report, write_report
     from pbcs_ompl.skills import Evaluation, SkillChain, TrainResult, evaluate, resume, train
 
@@ -28,6 +29,7 @@ __all__ = [
     "Comparison",
     "EnvSpec",
     "Evaluation",
+    "Export",
     "PlanResult",
     "Report",
     "ResetReport",
@@ -38,6 +40,7 @@ __all__ = [
     "check_resettable",
     "compare",
     "evaluate",
+    "export",
     "make",
     "plan",
     "resume",
@@ -53,6 +56,7 @@ _MODULES = {
     "experiments.compare": ("Comparison", "compare"),
     "experiments.run_study": ("StudyResult", "run_study"),
     "resettable": ("ResetReport", "check_resettable", "make"),
+    "results.export": ("Export", "export"),
     "results.report": ("Report", "write_report"),
     "skills": ("Evaluation", "SkillChain", "TrainResult", "evaluate", "resume", "train"),
 }

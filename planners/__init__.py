@@ -10,17 +10,22 @@ if TYPE_CHECKING:
     from pbcs_ompl.core.tree import Tree
     from pbcs_ompl.planners.context import PlanningContext
     from pbcs_ompl.planners.est_adapted import ESTAdapted
+    from pbcs_ompl.planners.est_compiled import ESTCompiled
     from pbcs_ompl.planners.ex import Ex
+    from pbcs_ompl.planners.kpiece_compiled import KPIECE1Compiled
     from pbcs_ompl.planners.planner import Strategy, TreePlanner
     from pbcs_ompl.planners.random_walk import RandomWalk
     from pbcs_ompl.planners.rides import Rides
+    from pbcs_ompl.planners.rrt_compiled import RRTCompiled
     from pbcs_ompl.planners.rrt_nh import RRTNH
     from pbcs_ompl.planners.rrt_steered import RRTSteered
 
-__all__ = ["RRTNH", "ESTAdapted", "Ex", "PlanningContext", "RRTSteered", "RandomWalk", "Rides", "Strategy",
-           "Tree", "TreePlanner"]
+__all__ = ["RRTNH", "ESTAdapted", "ESTCompiled", "Ex", "KPIECE1Compiled", "PlanningContext", "RRTCompiled",
+           "RRTSteered", "RandomWalk", "Rides", "Strategy", "Tree", "TreePlanner"]
 
-_MODULES = {"ESTAdapted": "planners.est_adapted", "Ex": "planners.ex", "PlanningContext": "planners.context",
+_MODULES = {"ESTAdapted": "planners.est_adapted", "ESTCompiled": "planners.est_compiled",
+            "KPIECE1Compiled": "planners.kpiece_compiled", "RRTCompiled": "planners.rrt_compiled",
+            "Ex": "planners.ex", "PlanningContext": "planners.context",
             "RandomWalk": "planners.random_walk", "Rides": "planners.rides", "RRTNH": "planners.rrt_nh",
             "RRTSteered": "planners.rrt_steered",
             "Strategy": "planners.planner", "Tree": "core.tree", "TreePlanner": "planners.planner"}

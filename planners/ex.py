@@ -59,7 +59,7 @@ class Ex(Strategy):
     def select(self, tree: Tree, count: int) -> IndexArray:
         """Return `count` selections in a row; each raises the counts of its node and bin before the next."""
         nodes = np.empty(count, np.int64)
-        select(self.queue, self.rng.random((count, 2)), nodes)
+        self.queue = select(self.queue, self.rng.random((count, 2)), nodes)
         return nodes
 
     def inserted(self, tree: Tree, first: int, last: int) -> None:

@@ -96,7 +96,7 @@ class Rides(Strategy):
 
     def inserted(self, tree: Tree, first: int, last: int) -> None:
         """Put the new nodes into their bins, and end the rides that are over."""
-        self.regions = reserve(self.regions, last - first)
+        self.regions = reserve(self.regions, last - first, last - first)
         rides_loop.note(self.regions, self._yields, self._rides, self._riding, tree.columns, first, last, self._size,
                           self.context.episode_steps)
 
@@ -104,7 +104,7 @@ class Rides(Strategy):
         """Ride for `count` steps in compiled code (see `pbcs_ompl.planners.compiled`)."""
         tree.reserve(count)
         self._add_rides(1)
-        self.regions = reserve(self.regions, count)
+        self.regions = reserve(self.regions, count, 1)
         written, reached = rides_loop.explore(
             step.parameters, feature_dims, self._bounds, tree.columns, len(tree), count, self.regions, self._size,
             self.context.episode_steps, self._yields, self._rides, self._actions, self.rng)

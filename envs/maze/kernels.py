@@ -67,8 +67,9 @@ def _cell(x: float, cells: float) -> int:
 def _hits_any(rectangles: Array, lists: IndexArray, begin: int, end: int,
               x0: float, y0: float, x1: float, y1: float) -> bool:
     for k in range(begin, end):
-        wall = rectangles[lists[k]]
-        if hits_rectangle(x0, y0, x1, y1, wall[0], wall[1], wall[2], wall[3]):
+        wall = lists[k]  # a view of the row would cost as much as the test
+        if hits_rectangle(x0, y0, x1, y1, rectangles[wall, 0], rectangles[wall, 1], rectangles[wall, 2],
+                          rectangles[wall, 3]):
             return True
     return False
 

@@ -7,13 +7,13 @@ each network of the stack.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents.initialisation import INITIALISATIONS, draw_layer, layer_shapes
 from pbcs_ompl.agents.kernels.network import BETA_1, BETA_2
 from pbcs_ompl.agents.policy import LAYER_NORM_EPSILON
 
@@ -57,16 +57,18 @@ class MLP:
     Args:
         sizes: Width of the input, of every hidden layer, and of the output.
         layer_norm: Normalise every hidden layer before its ReLU, with learnt gain and shift.
+        late_inputs: How many of the last inputs skip the first layer and join its values.
     """
 
     sizes: tuple[int, ...]
     layer_norm: bool = False
+    late_inputs: int = 0
 
     @property
     def num_parameters(self) -> int:
         """Number P of parameters of one seed."""
         norm = 2 * sum(self.sizes[1:-1]) if self.layer_norm else 0
-        return norm + sum((before + 1) * after for before, after in pairwise(self.sizes))
+        return norm + sum((before + 1) * after for before, after in layer_shapes(self.sizes, self.late_inputs))
 
     def split(self, flat: Tensor) -> list[Layer]:
         """Return the layers of a buffer [S * P] as views: one contiguous block for each parameter."""
@@ -77,29 +79,33 @@ class MLP:
             start += seeds * rows * width
             return flat[start - seeds * rows * width : start].view(seeds, rows, width)
 
-        for index, (before, after) in enumerate(pairwise(self.sizes)):
+        for index, (before, after) in enumerate(layer_shapes(self.sizes, self.late_inputs)):
             normed = self.layer_norm and index < len(self.sizes) - 2
             layers.append(Layer(take(before, after), take(1, after),
                                 Norm(take(1, after), take(1, after)) if normed else None))
         return layers
+
+    def divide(self, inputs: Tensor) -> tuple[Tensor, Tensor | None]:
+        """Return the inputs of the first layer, and those that join its values, if any."""
+        first = inputs.shape[-1] - self.late_inputs
+        return (inputs[..., :first], inputs[..., first:]) if self.late_inputs else (inputs, None)
 
     def select(self, flat: Tensor, members: Sequence[int]) -> Tensor:
         """Return a copy of the buffer of some networks of a stack, by their indices."""
         chosen = torch.tensor(members, device=flat.device)
         return torch.cat([block[chosen].flatten() for layer in self.split(flat) for block in layer.tensors()])
 
-    def initial(self, generators: Sequence[np.random.Generator]) -> Tensor:
-        """Draw parameters [S * P] from the distribution of torch.nn.Linear, each seed's from its own generator.
-
-        Weights and biases are uniform in +-1/sqrt(number of inputs). Generators are NumPy's: torch's use 32 bits of
-        their seed on a CPU, too few for stacks of many seeds.
-        """
+    def initial(self, generators: Sequence[np.random.Generator], initialisation: str = "torch") -> Tensor:
+        """Draw parameters [S * P], each seed's from its own generator, from a law of `INITIALISATIONS`."""
         flat = torch.empty(len(generators) * self.num_parameters)
-        for layer in self.split(flat):
-            bound = layer.weight.shape[1] ** -0.5
+        layers = self.split(flat)
+        for index, layer in enumerate(layers):
+            fan_in, fan_out = layer.weight.shape[1:]
+            bounds = INITIALISATIONS[initialisation](fan_in, fan_out, index == len(layers) - 1)
             for weight, bias, generator in zip(layer.weight, layer.bias, generators, strict=True):
-                weight.copy_(torch.from_numpy(generator.uniform(-bound, bound, weight.shape)))
-                bias.copy_(torch.from_numpy(generator.uniform(-bound, bound, bias.shape)))
+                drawn = draw_layer(bounds, fan_in, fan_out, generator)
+                weight.copy_(torch.from_numpy(drawn[0]))
+                bias.copy_(torch.from_numpy(drawn[1]))
             if layer.norm is not None:
                 layer.norm.gain.fill_(1.0)
                 layer.norm.shift.zero_()
@@ -133,13 +139,15 @@ class Weights:
     def __call__(self, inputs: Tensor) -> Tensor:
         """Return the outputs [S, B, out] for inputs [S, B, in]."""
         *hidden, last = self.layers
-        values = inputs
-        for weight, bias, norm in hidden:
+        values, late = self.network.divide(inputs)
+        for index, (weight, bias, norm) in enumerate(hidden):
             values = torch.baddbmm(bias, values, weight)
             if norm is not None:
                 normal, _, _ = torch.native_layer_norm(values, values.shape[-1:], None, None, LAYER_NORM_EPSILON)
                 values = torch.addcmul(norm.shift, normal, norm.gain)
             values = values.relu_()
+            if index == 0 and late is not None:
+                values = torch.cat((values, late), dim=2)
         return torch.baddbmm(last.bias, values, last.weight)
 
 
@@ -151,11 +159,18 @@ class TrainedNetwork:
         target: Their targets.
         gradient: Where `autograd`, or a kernel in its place, leaves the gradient of a loss.
         mean, square: Adam's moments [S * P].
+
+    Args:
+        network: The shape of the networks.
+        generators: One for each network.
+        device: Where they lie.
+        initialisation: From which law their parameters are drawn.
     """
 
-    def __init__(self, network: MLP, generators: Sequence[np.random.Generator], device: torch.device):
+    def __init__(self, network: MLP, generators: Sequence[np.random.Generator], device: torch.device,
+                 initialisation: str = "torch"):
         self.network = network
-        initial = network.initial(generators).to(device)
+        initial = network.initial(generators, initialisation).to(device)
         self.weights = Weights(network, initial)
         self.target = Weights(network, initial.clone())
         self.gradient = Weights(network, torch.zeros_like(initial))

@@ -114,7 +114,7 @@ class SAC(StackedAgent):
         count = observations.shape[1]
         noise = normal(self._sample_keys, int(self._num_samples), count, (self.action_size,)).swapaxes(0, 1)
         with torch.inference_mode():
-            outputs = self.actor.weights(self.tensor(observations))
+            outputs = self.actor.weights(self.observed(observations))
             squashed, _ = losses.sample_squashed(outputs, torch.from_numpy(noise).to(self.device))
             self._num_samples += count
             return to_box(squashed.cpu().numpy(), self.action_low, self.action_high)

@@ -11,6 +11,7 @@ from importlib.resources import files
 from math import inf
 from typing import Any, ClassVar, Self
 
+from pbcs_ompl.agents.initialisation import INITIALISATIONS
 from pbcs_ompl.core.errors import InvalidOption, UnknownName
 from pbcs_ompl.core.options import check_names, check_range, check_types
 
@@ -36,6 +37,8 @@ def _read_preset(name: str) -> dict[str, Any]:
     return tomllib.loads(files("pbcs_ompl.agents").joinpath(f"{name}.toml").read_text("utf-8"))
 
 
+INPUTS = ("plain", "baselines")
+"""See `inputs.py`."""
 DEEPEST, WIDEST, LARGEST = 64, 16_384, 1_000_000_000
 """Of the layers of a network, and of a mini-batch or replay buffer: what is larger fits no machine."""
 
@@ -53,6 +56,8 @@ class AgentSettings:
         discount: Of rewards, gamma.
         polyak: Fraction of a target network that stays in each update (1 - tau).
         replay_capacity: Transitions of each seed that are kept.
+        initialisation: The law of new networks, a name in `initialisation.INITIALISATIONS`.
+        inputs: How networks take observations and actions, "plain" or "baselines" (`inputs.py`).
 
     Raises:
         InvalidOption: a value of the wrong type or out of its range.
@@ -68,6 +73,8 @@ class AgentSettings:
     discount: float = 0.9
     polyak: float = 0.995
     replay_capacity: int = 1_000_000
+    initialisation: str = "torch"
+    inputs: str = "plain"
 
     def __post_init__(self) -> None:
         if isinstance(self.hidden, list):
@@ -82,6 +89,9 @@ class AgentSettings:
         for name in ("batch_size", "replay_capacity"):
             check_range(name, getattr(self, name), 1 <= getattr(self, name) <= LARGEST, f"from 1 to {LARGEST}")
         check_range("discount", self.discount, 0.0 <= self.discount < 1.0, "in [0, 1)")
+        check_range("initialisation", self.initialisation, self.initialisation in INITIALISATIONS,
+                    f"one of {', '.join(INITIALISATIONS)}")
+        check_range("inputs", self.inputs, self.inputs in INPUTS, f"one of {', '.join(INPUTS)}")
         check_range("polyak", self.polyak, 0.0 <= self.polyak <= 1.0, "in [0, 1]")
 
     @classmethod

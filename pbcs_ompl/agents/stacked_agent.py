@@ -24,6 +24,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from pbcs_ompl.agents.inputs import INPUT_KINDS, PlainInputs
 from pbcs_ompl.agents.kernels.counter_rng import stream_keys
 from pbcs_ompl.agents.losses import ActionBox, td_targets
 from pbcs_ompl.agents.networks import MLP, Loss, TrainedNetwork, TrainedScalar, adam_rates
@@ -61,7 +62,8 @@ class StackedAgent(ABC):
         num_critics: Critics of each seed. They are one stack: the first ones of all seeds, then the second ones.
         actor, critic: The networks.
         replay: The replay buffers.
-        box: The action box, for losses.
+        inputs: How the networks take observations and actions.
+        box: The actions that the networks take, for losses.
         stream_keys: Keys [S] of the random numbers of updates, for `kernels.counter_rng`.
 
     Raises:
@@ -87,8 +89,10 @@ class StackedAgent(ABC):
         self.device = choose_device(device)
         self.compile: Compile = compile
         self.num_updates = 0
-        self.box = ActionBox(self.tensor((self.action_high - self.action_low) / 2.0),
-                             self.tensor((self.action_high + self.action_low) / 2.0))
+        box = ActionBox(self.tensor((self.action_high - self.action_low) / 2.0),
+                        self.tensor((self.action_high + self.action_low) / 2.0))
+        self.inputs = INPUT_KINDS[self.settings.inputs](len(self.seeds), observation_size, box)
+        self.box = self.inputs.box
         self.stream_keys = stream_keys(self.seeds, "updates")
         self._trained = self.make_networks([SeedTree(seed).child("weights").generator() for seed in self.seeds])
         self.replay = Replay(observation_size, self.action_size, seeds=self.seeds,
@@ -97,11 +101,12 @@ class StackedAgent(ABC):
 
     def make_networks(self, generators: Sequence[np.random.Generator]) -> dict[str, TrainedNetwork | TrainedScalar]:
         """Return all that is trained, by name; an algorithm that trains more than actor and critic adds to it."""
-        hidden, norm = self.settings.hidden, self.settings.layer_norm
+        hidden, norm, law = self.settings.hidden, self.settings.layer_norm, self.settings.initialisation
+        late = self.action_size if self.inputs.late_actions else 0
         actor = MLP((self.observation_size, *hidden, self.outputs_per_action * self.action_size), norm)
-        critic = MLP((self.observation_size + self.action_size, *hidden, 1), norm)
-        self.actor = TrainedNetwork(actor, generators, self.device)
-        self.critic = TrainedNetwork(critic, list(generators) * self.num_critics, self.device)
+        critic = MLP((self.observation_size + self.action_size, *hidden, 1), norm, late)
+        self.actor = TrainedNetwork(actor, generators, self.device, law)
+        self.critic = TrainedNetwork(critic, list(generators) * self.num_critics, self.device, law)
         return {"actor": self.actor, "critic": self.critic}
 
     @abstractmethod
@@ -178,7 +183,7 @@ class StackedAgent(ABC):
 
     def critic_values(self, observations: Array, actions: Array) -> Array:
         """Return the values [C S, B] of all C critics of each seed, the first ones of all seeds first."""
-        inputs = torch.cat((self.tensor(observations), self.tensor(actions)), dim=2)
+        inputs = torch.cat((self.observed(observations), self.inputs.actions(self.tensor(actions))), dim=2)
         with torch.inference_mode():
             values = self.critic.weights(inputs.repeat(self.num_critics, 1, 1))
             return values.squeeze(2).double().cpu().numpy()
@@ -186,7 +191,7 @@ class StackedAgent(ABC):
     def act(self, observations: Array) -> Array:
         """Return the actors' actions [S, B, A] for observations [S, B, O], without noise."""
         with torch.inference_mode():
-            outputs = self.actor.weights(self.tensor(observations))[..., : self.action_size]
+            outputs = self.actor.weights(self.observed(observations))[..., : self.action_size]
             return to_box(outputs.tanh().cpu().numpy(), self.action_low, self.action_high)
 
     def explore(self, observations: Array) -> Array:
@@ -221,6 +226,7 @@ class StackedAgent(ABC):
             if not np.isfinite(values if mask is None else values[mask]).all():
                 raise NonFiniteData(f"{name} hold NaN or infinity, after update {self.num_updates}")
         terminals = np.asarray(terminals, dtype=np.float64)
+        self.inputs.add(observations, mask)
         self.replay.add(observations, actions, rewards, next_observations, terminals, mask)
 
     def clear_replay(self) -> None:
@@ -253,7 +259,7 @@ class StackedAgent(ABC):
         return {name: losses / num_updates for name, losses in total.items()}
 
     def _train_chunk(self, count: int) -> dict[str, np.ndarray]:
-        rows = self.replay.sample(count, self.settings.batch_size)
+        rows = self.inputs.rows(self.replay.sample(count, self.settings.batch_size))
         losses = self.run_updates(rows, self.num_updates + 1)
         for name, values in losses.items():
             if not np.isfinite(values).all():
@@ -275,7 +281,7 @@ class StackedAgent(ABC):
 
     def policy(self, seed_index: int = 0) -> Policy:
         """Return a copy of one seed's actor that no longer changes."""
-        return policy_of(self.actor, seed_index, self.action_low, self.action_high)
+        return policy_of(self.actor, seed_index, self.action_low, self.action_high, self.inputs)
 
     def state_dict(self, indices: Sequence[int] | None = None) -> dict[str, np.ndarray]:
         """Return everything that training needs to continue bit for bit, as named arrays.
@@ -286,6 +292,7 @@ class StackedAgent(ABC):
         chosen = range(len(self.seeds)) if indices is None else indices
         state = {name: tensor.cpu().numpy() for name, tensor in self.part(chosen).items()}
         state |= {f"replay/{name}": array for name, array in self.replay.state_dict(chosen).items()}
+        state |= {f"inputs/{name}": array for name, array in self.inputs.state_dict(chosen).items()}
         return state | {"num_updates": np.array(self.num_updates), "seeds": np.array(self.seeds)[list(chosen)]}
 
     def load_state_dict(self, state: Mapping[str, np.ndarray]) -> None:
@@ -296,7 +303,9 @@ class StackedAgent(ABC):
         """
         tensors = self.tensors()
         replay = {key.removeprefix("replay/"): state[key] for key in state if key.startswith("replay/")}
-        if not {*tensors, "seeds", "num_updates"} <= set(state) or not self.replay.can_load(replay):
+        inputs = {key.removeprefix("inputs/"): state[key] for key in state if key.startswith("inputs/")}
+        same_inputs = set(inputs) == set(self.inputs.state_dict(range(len(self.seeds))))
+        if not ({*tensors, "seeds", "num_updates"} <= set(state) and self.replay.can_load(replay) and same_inputs):
             raise Mismatch("this is not the state of such an agent: networks or transitions are missing")
         if tuple(np.ravel(state["seeds"])) != self.seeds:
             raise Mismatch(f"state of the seeds {np.ravel(state['seeds'])}, expected {self.seeds}")
@@ -307,6 +316,7 @@ class StackedAgent(ABC):
         for name, tensor in tensors.items():
             tensor.copy_(torch.from_numpy(np.ascontiguousarray(state[name])))
         self.replay.load_state_dict(replay)
+        self.inputs.load_state_dict(inputs)
         self.num_updates = int(state["num_updates"])
 
     def clone(self, indices: Sequence[int] | None = None) -> Self:
@@ -327,23 +337,31 @@ class StackedAgent(ABC):
         return {f"{name}/{part}": tensor for name, trained in self._trained.items()
                 for part, tensor in trained.part(seeds, len(self.seeds)).items()}
 
+    def observed(self, observations: Array) -> Tensor:
+        """Return observations [S, B, O] as the networks take them."""
+        return self.inputs.observations(self.tensor(observations))
+
     def tensor(self, values: Array) -> Tensor:
         """Return an array as float32 on the agent's device."""
         return torch.from_numpy(np.asarray(values, dtype=np.float32)).to(self.device)
 
 
-def policy_of(actor: TrainedNetwork, seed_index: int, low: Array, high: Array) -> Policy:
+def policy_of(actor: TrainedNetwork, seed_index: int, low: Array, high: Array,
+              inputs: PlainInputs | None = None) -> Policy:
     """Return a copy of one actor of a stack that no longer changes.
 
     Args:
         actor: Its first A outputs, through a tanh, are the action.
         seed_index: Which one.
         low, high: The action box [A].
+        inputs: How it takes observations; None for as they are.
     """
     layers: list[tuple[np.ndarray, ...]] = []
     for weight, *vectors in (layer.tensors() for layer in actor.weights.layers):
         parts = (weight[seed_index], *(vector[seed_index, 0] for vector in vectors))
         layers.append(tuple(part.cpu().numpy().copy() for part in parts))
+    if inputs is not None:
+        layers[0] = (*inputs.raw_layer(layers[0][0], layers[0][1], seed_index), *layers[0][2:])
     layers[-1] = tuple(np.ascontiguousarray(part[..., :len(low)]) for part in layers[-1])
     return Policy(tuple(layers), low.copy(), high.copy())
 

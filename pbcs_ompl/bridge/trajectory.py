@@ -5,16 +5,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 
 from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import DamagedFile, Mismatch
+from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch, MissingDependency
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import path_control, value_reader
 from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.types import Array, IndexArray
+from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.actions import ActionMap, Actions
+from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.arrays import NUMBERS, take, take_words
 from pbcs_ompl.results.files import read_arrays, write_arrays
 from pbcs_ompl.results.provenance import environment_versions
@@ -102,6 +105,91 @@ class Trajectory:
         return cls(EnvSpec.from_dict(words["environment"], trusted=trust), states, actions, rewards, words["planner"],
                    words["seed"], words["reset_seed"], words["versions"])
 
+    @classmethod
+    @checked
+    def from_arrays(cls, env: str | EnvSpec | gymnasium.Env[Any, Any] | ResettableModel, actions: Any, *,
+                    reset_seed: int | None = None, first_state: Any = None, env_kwargs: dict[str, Any] | None = None,
+                    goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None,
+                    source: str = "demonstration") -> "Trajectory":
+        """Return the trajectory of a demonstration: the states that its actions lead to, up to the first success.
+
+        Args:
+            env: The environment, in any form that `pbcs_ompl.make` takes.
+            actions: What was done [T, ...], members of the action space.
+            reset_seed: The seed of the reset that the demonstration began with.
+            first_state: The state [D] that it began with, in place of a reset. A fresh environment cannot start there,
+                so that nothing trained along it is called solved.
+            env_kwargs, goal, feature: See `pbcs_ompl.make`.
+            source: Its name, in place of a planner's.
+
+        Raises:
+            InvalidOption: neither or both of `reset_seed` and `first_state`, or actions of another shape.
+            CallbackFailed: the environment raised.
+        """
+        model = make(env, env_kwargs, goal=goal, feature=feature)
+        if (reset_seed is None) == (first_state is None) and model.spec.start_seed is None:
+            raise InvalidOption("expected reset_seed, the seed of the reset that the demonstration began with, or "
+                                "first_state, and not both")
+        controls = _controls(actions, model)
+        kept = controls if model.env is None else ActionMap.of(model.env.action_space).to_actions(controls)
+        seed = None if first_state is not None else model.spec.reset_seed(reset_seed)
+        state = model.initial_state(seed) if first_state is None else np.array(first_state, dtype=np.float64)
+        states, rewards = [state], []
+        for control in controls:
+            outcome = model.transition(states[-1][None], control[None])
+            states.append(outcome.states[0])
+            rewards.append(float(outcome.rewards[0]))
+            if outcome.success[0] or outcome.ended[0]:
+                break
+        return cls(model.spec, np.array(states), kept[:len(rewards)], np.array(rewards), source, 0, seed)
+
+    @classmethod
+    @checked
+    def from_minari(cls, dataset: Any, episode: int = 0, *, env: str | EnvSpec | None = None,
+                    goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None) -> "Trajectory":
+        """Return the trajectory of an episode of a Minari data set.
+
+        The episode begins with the reset whose seed the data set has, and its actions have to lead to its observations.
+
+        Args:
+            dataset: A `minari.MinariDataset`, or its id.
+            episode: Which one.
+            env: The environment, where it is not the one that the data set names.
+            goal, feature: See `pbcs_ompl.make`.
+
+        Raises:
+            MissingDependency: minari is not installed.
+            Mismatch: the data set names no environment or no seed, or its actions lead elsewhere here.
+        """
+        try:
+            import minari
+        except ModuleNotFoundError as error:
+            raise MissingDependency('data sets of Minari need minari: pip install "pbcs-ompl[minari]"') from error
+        opened = minari.load_dataset(dataset) if isinstance(dataset, str) else dataset
+        if env is None and opened.env_spec is None:
+            raise Mismatch("the data set names no environment; give env")
+        (found,) = opened.iterate_episodes([episode])
+        (words,) = opened.storage.get_episode_metadata([episode])
+        seed = words.get("seed")
+        if seed is None:
+            raise Mismatch(f"episode {episode} has no seed, so its start is unknown; use Trajectory.from_arrays with "
+                           "first_state")
+        task = EnvSpec(opened.env_spec.id, opened.env_spec.kwargs) if env is None else env
+        made = cls.from_arrays(task, found.actions, reset_seed=int(seed), goal=goal, feature=feature,
+                               source=f"minari episode {episode}")
+        made._check_observed(make(made.environment), found.observations)
+        return made
+
+    def _check_observed(self, model: ResettableModel, observations: Any) -> None:
+        """Raise Mismatch unless the states of the trajectory show the observations of an episode, but for rounding."""
+        expected = _rows_of(observations)[:self.length + 1]
+        seen = model.observe(self.states)
+        if seen.shape != expected.shape or not np.allclose(seen, expected, rtol=1e-5, atol=1e-6):
+            wrong = "their shape" if seen.shape != expected.shape else (
+                f"step {np.flatnonzero(~np.isclose(seen, expected, rtol=1e-5, atol=1e-6).all(axis=1))[0]}")
+            raise Mismatch(f"the actions of the episode lead elsewhere in {self.environment}: observations differ in "
+                           f"{wrong}; it was recorded with other versions, or in another environment")
+
     def replay(self, model: ResettableModel) -> Array:
         """Return the states [T+1, D] that the actions lead to.
 
@@ -151,6 +239,28 @@ class Trajectory:
             if installed.get(package) != version:
                 raise Mismatch(f"the trajectory was made with {package} {version}, installed is "
                                f"{installed.get(package, 'none')}; plan again, or install that version")
+
+
+def _controls(actions: Any, model: ResettableModel) -> Array:
+    """Return actions as controls [T, A].
+
+    Raises:
+        InvalidOption: they are of another shape, or not finite.
+    """
+    controls = np.array(actions, dtype=np.float64)
+    size = len(model.action_low)
+    if controls.ndim < 1 or controls.size != len(controls) * size or not np.isfinite(controls).all():
+        raise InvalidOption(f"actions of the shape {controls.shape}; expected finite ones [T, {size}]")
+    return controls.reshape(len(controls), size)
+
+
+def _rows_of(observations: Any) -> Array:
+    """Return the observations of an episode as vectors [T+1, O]; parts of dictionaries follow each other by name."""
+    if isinstance(observations, dict):
+        return np.concatenate([_rows_of(observations[name]) for name in sorted(observations)], axis=1)
+    if isinstance(observations, tuple):
+        return np.concatenate([_rows_of(part) for part in observations], axis=1)
+    return np.array(observations, dtype=np.float64).reshape(len(observations), -1)
 
 
 def to_trajectory(path: Any, space_information: Any, model: ResettableModel, *, planner: str = "",

@@ -11,6 +11,7 @@ from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
 EXECUTORS = ("local", "ray")
 SCHEDULERS = ("make", "slurm")
+FORMATS = ("numpy", "onnx", "sb3", "minari", "maniskill", "planner-arena", "csv")
 DESCRIPTION = """\
 Plan with OMPL in any environment that can be reset,
 then train a chain of skills along the plan.
@@ -70,7 +71,7 @@ def build_parser() -> Parser:
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
-    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report):
+    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export):
         name, purpose = add.__name__.removeprefix("_"), add.__doc__ or ""
         verb = group.add_parser(name, help=purpose, description=purpose)
         add(verb)
@@ -221,6 +222,31 @@ def _report(verb: Parser) -> None:
     verb.add_argument("dir", metavar="DIR", help="a folder of results, or one that holds many, such as runs")
     verb.add_argument("--out", metavar="FILE",
                       help="the page (report.html in DIR); an older report is replaced, another file never")
+
+
+def _view(verb: Parser) -> None:
+    """show a plan or a training in three dimensions, as one HTML page with a slider for the time"""
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs plan or pbcs train")
+    verb.add_argument("--out", metavar="FILE",
+                      help="the page (view.html in DIR); an older view is replaced, another file never")
+    verb.add_argument("--open", action="store_true", help="open the page in the browser")
+    _add_trust(verb, "the folder")
+
+
+def _export(verb: Parser) -> None:
+    """write a result folder in the format of another tool"""
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train, plan, distill or compare, or ant")
+    verb.add_argument("--to", required=True, type=choice("format", FORMATS), metavar="FORMAT",
+                      help="a controller: numpy, onnx; episodes: minari, maniskill, csv; both: sb3; a comparison: "
+                           "planner-arena, csv")
+    verb.add_argument("--episodes", type=integer(0), default=10, metavar="N",
+                      help="how many episodes a controller drives, and how many paths of a tree are taken (10)")
+    verb.add_argument("--epsilon", type=fraction, default=0.0, metavar="E",
+                      help="probability of a random action in each step of these (0)")
+    verb.add_argument("--seed", type=integer(0), default=0, metavar="N", help="seed of the random actions (0)")
+    verb.add_argument("--path", metavar="DIR", help="of a follower: the plan whose line it begins with")
+    _add_out(verb)
+    _add_trust(verb, "the folder")
 
 
 def _add_execution(verb: Parser) -> None:

@@ -143,7 +143,9 @@ def path_control(si: Any, states: Array, controls: Array) -> Any:
     write_state, write_control = value_writer(si.getStateSpace()), value_writer(si.getControlSpace())
     path, state, control = oc.PathControl(si), si.allocState(), si.allocControl()
     duration = si.getPropagationStepSize()
-    for values, action in zip(states[:-1].tolist(), controls.tolist(), strict=True):
+    # Tuples out of zip are freed one by one; a list for each state would wake the garbage collector.
+    for values, action in zip(zip(*states[:-1].T.tolist(), strict=True), zip(*controls.T.tolist(), strict=True),
+                              strict=True):
         write_state(state, values)
         write_control(control, action)
         path.append(state, control, duration)

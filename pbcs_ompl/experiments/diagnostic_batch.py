@@ -68,6 +68,11 @@ class DiagnosticBatch:
         """Return max |pi| [S]."""
         return diagnostics.largest_actions(agent.act, _of_all(agent, self.observations))
 
+    def mean_action(self, agent: StackedAgent) -> Array:
+        """Return the mean of the first component of pi [S]."""
+        first: Array = agent.act(_of_all(agent, self.observations))[..., 0].mean(axis=1)
+        return first
+
     def distance_to_returns(self, agent: StackedAgent, discount: float, horizon: int) -> Array:
         """Return the mean of |Q - Q^pi| [S]."""
         return diagnostics.distance_to_returns(self.model, agent.act, agent.value, _of_all(agent, self.states),

@@ -88,8 +88,8 @@ class Curves:
     def summary(self) -> dict[str, object]:
         """Return plain values for a record."""
         return {"seeds": list(self.seeds), "steps": self.steps, "success": np.array(self.success).astype(int).tolist(),
-                "first_reward": self.first_reward.tolist(), "rewarded": np.array(self.rewarded).tolist(),
-                "observed": {name: np.array(values).tolist() for name, values in self.observed.items()},
+                "first_reward": self.first_reward.tolist(), "rewarded": np.array(self.rewarded).round(6).tolist(),
+                "observed": {name: np.array(values).round(5).tolist() for name, values in self.observed.items()},
                 "solved_at": self.solved_at.tolist(), "ended": self.ended}
 
 

@@ -11,7 +11,7 @@ from pbcs_ompl.core.interfaces import GetSetEnv, ResettableModel, VectorisedEnv
 from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.resettable.adapters.classic import VectorEnv
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel
-from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, MujocoModel, is_mujoco_env
+from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, MujocoModel
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
@@ -20,6 +20,7 @@ from pbcs_ompl.resettable.families import proved, restorable
 from pbcs_ompl.resettable.fresh import EnvMaker, episode_limit, fresh_maker, spec_of
 from pbcs_ompl.resettable.memory.uncovered import refuse_uncovered
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
+from pbcs_ompl.resettable.simulation import simulation_of
 from pbcs_ompl.resettable.supported import TaskMaker, task_env, task_maker
 from pbcs_ompl.resettable.task_env import bare
 
@@ -96,7 +97,7 @@ def _choose(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None) -
     ruled = goal is not None or feature is not None
     if isinstance(inner, VectorisedEnv) and not ruled:
         return _as_model(VectorisedModel(inner))
-    if isinstance(inner, GetSetEnv) and not (is_mujoco_env(inner) and not _is_vector(inner)):
+    if isinstance(inner, GetSetEnv) and not (simulation_of(inner) is not None and not _is_vector(inner)):
         return _get_set(inner, goal, feature, make_inner)
     return _model_of(restorable(inner, goal, feature, make_inner))
 

@@ -18,7 +18,7 @@ from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.observing import state_observer
 from pbcs_ompl.resettable.rewards import same_rewards
-from pbcs_ompl.resettable.rules import Outcome
+from pbcs_ompl.resettable.rules import Outcome, reported_success
 from pbcs_ompl.resettable.supported import TaskMaker
 
 SHORT, LONG = 12, 60
@@ -68,9 +68,16 @@ def first_difference(env: Any, make_inner: TaskMaker, *, steps: int = SHORT, see
 def fresh_difference(env: Any, make_inner: TaskMaker, *, steps: int = LONG, seed: int = 0) -> str:
     """Return what differs first between two fresh instances that do the same, or an empty string."""
     actions = _sequence(env, np.random.default_rng(seed), steps)
-    one, two = (fresh_episode(env, make_inner, seed, actions) for _ in range(2))
-    return next((f"{found} at step {step}" for step, (mine, theirs) in enumerate(zip(one, two, strict=False))
-                 if (found := mine.difference(theirs))), "" if len(one) == len(two) else f"the end at step {len(one)}")
+    return _difference(*(fresh_episode(env, make_inner, seed, actions) for _ in range(2)))
+
+
+def repeats(env: Any, make_inner: TaskMaker, *, steps: int = LONG, seed: int = 0) -> bool:
+    """Return whether one instance does the same twice."""
+    actions, inner = _sequence(env, np.random.default_rng(seed), steps), make_inner()
+    try:
+        return not _difference(*(_episode(env, inner, seed, actions) for _ in range(2)))
+    finally:
+        inner.close()
 
 
 def fresh_episode(env: Any, make_inner: TaskMaker, seed: int, actions: list[Any]) -> list[Moment]:
@@ -84,18 +91,9 @@ def fresh_episode(env: Any, make_inner: TaskMaker, seed: int, actions: list[Any]
     """
     inner = make_inner()
     try:
-        observation, _ = inner.reset(seed=seed)
-        moments = [Moment(_named_state(env, inner), flat(observation))]
-        for action in actions:
-            if moments[-1].terminated or moments[-1].truncated:
-                break
-            observation, reward, terminated, truncated, info = inner.step(copied(action))
-            outcome = Outcome(inner, observation, float(reward), bool(terminated), info)
-            moments.append(Moment(_named_state(env, inner), flat(observation), float(reward), bool(terminated),
-                                  bool(truncated), _success(env, outcome)))
+        return _episode(env, inner, seed, actions)
     finally:
         inner.close()
-    return moments
 
 
 class _Branching:
@@ -193,6 +191,25 @@ class _Branching:
         return self._env.inner if isinstance(self._env, RestorableEnv | SuccessFlagEnv) else self._env
 
 
+def _episode(env: Any, inner: Any, seed: int, actions: list[Any]) -> list[Moment]:
+    observation, _ = inner.reset(seed=seed)
+    moments = [Moment(_named_state(env, inner), flat(observation))]
+    for action in actions:
+        if moments[-1].terminated or moments[-1].truncated:
+            break
+        observation, reward, terminated, truncated, info = inner.step(copied(action))
+        outcome = Outcome(inner, observation, float(reward), bool(terminated), info)
+        moments.append(Moment(_named_state(env, inner), flat(observation), float(reward), bool(terminated),
+                              bool(truncated), _success(env, outcome)))
+    return moments
+
+
+def _difference(one: list[Moment], two: list[Moment]) -> str:
+    """Return what differs first between two episodes, with its step, or an empty string."""
+    return next((f"{found} at step {step}" for step, (mine, theirs) in enumerate(zip(one, two, strict=False))
+                 if (found := mine.difference(theirs))), "" if len(one) == len(two) else f"the end at step {len(one)}")
+
+
 def _sequence(env: Any, rng: np.random.Generator, steps: int) -> list[Any]:
     """Return actions, each of them a few times."""
     actions = ActionMap.of(env.action_space)
@@ -214,7 +231,7 @@ def _kept(value: Any) -> Any:
 def _success(env: Any, outcome: Outcome) -> bool:
     if isinstance(env, RestorableEnv):
         return env.is_success(outcome)
-    return bool(outcome.info.get("is_success", outcome.info.get("success", outcome.terminated)))
+    return reported_success(outcome)
 
 
 def _first_index(one: Any, other: Any) -> str | None:

@@ -5,10 +5,11 @@ from typing import Any, TypeVar
 
 from pbcs_ompl.core.errors import NotResettable
 from pbcs_ompl.resettable.adapters.classic import AttributeEnv, has_state_attribute
-from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, check_observes, is_mujoco_env
+from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.visited import CopiedEnv, FreshEnv, ReplayedEnv, copies_are_faithful, replays
-from pbcs_ompl.resettable.branching import first_difference, fresh_difference
+from pbcs_ompl.resettable.branching import first_difference, fresh_difference, repeats
+from pbcs_ompl.resettable.simulation import simulation_of
 from pbcs_ompl.resettable.supported import TaskMaker
 from pbcs_ompl.resettable.task_env import bare
 
@@ -33,8 +34,7 @@ def restorable(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None
     Raises:
         NotResettable: none does; says what differs.
     """
-    if is_mujoco_env(inner):
-        check_observes(inner)
+    if simulation_of(inner) is not None:
         return proved(MujocoEnv(inner, goal, feature), make_inner)
     if has_state_attribute(inner):
         return proved(AttributeEnv(inner, goal, feature), make_inner)
@@ -68,16 +68,14 @@ def proved(env: Provable, make_inner: TaskMaker | None) -> Provable:
     if isinstance(env, RestorableEnv):
         env.check_constants()
     inner: Any = getattr(env, "inner", env)
-    if random := fresh_difference(env, make_inner):
-        raise NotResettable(_random(inner, random))
+    _refuse_random(env, inner, make_inner)
     raise NotResettable(f"{_name(inner)} is not resettable: a restored state does not continue as a fresh instance "
                         f"does; it differs in {found}; {HOW_TO}")
 
 
 def _fresh(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker) -> RestorableEnv:
     env = FreshEnv(inner, goal, feature, make_inner=make_inner)
-    if random := fresh_difference(env, make_inner):
-        raise NotResettable(_random(inner, random))
+    _refuse_random(env, inner, make_inner)
     if found := first_difference(env, make_inner):
         raise NotResettable(f"{_name(inner)} is not resettable: replayed in a fresh instance, it differs in {found}; "
                             f"{HOW_TO}")
@@ -90,9 +88,23 @@ def _difference(env: Any, make_inner: TaskMaker | None) -> str:
     return "" if make_inner is None else first_difference(env, make_inner)
 
 
-def _random(inner: Any, found: str) -> str:
-    return (f"{_name(inner)} is not resettable: the same actions from the same seed lead elsewhere, so its steps are "
-            f"random: fresh instances differ in {found}; make the randomness part of its state")
+def _refuse_random(env: Any, inner: Any, make_inner: TaskMaker) -> None:
+    """Refuse an environment of which two fresh instances that do the same differ.
+
+    Raises:
+        NotResettable: says where, and whether steps or the making of it are random.
+    """
+    found = fresh_difference(env, make_inner)
+    if not found:
+        return
+    if repeats(env, make_inner):
+        raise NotResettable(f"{_name(inner)} is not resettable: each instance of it is another environment, as if its "
+                            f"constructor drew random numbers: with the same seed and actions, fresh instances differ "
+                            f"in {found}; draw them in reset, or give the constructor a seed")
+    what = "resets" if found.endswith("at step 0") else "steps"
+    raise NotResettable(f"{_name(inner)} is not resettable: the same actions from the same seed lead elsewhere, so its "
+                        f"{what} are random, or depend on what is outside of it: fresh instances differ in {found}; "
+                        f"draw from self.np_random in reset, or make the randomness part of its state")
 
 
 def _warn(text: str) -> None:

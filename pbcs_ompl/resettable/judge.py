@@ -6,6 +6,7 @@ search and agents train, has no part in it.
 
 import math
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -149,7 +150,7 @@ class _Episode:
         self.ending: Ending | None = None
         self._rewards: list[float] = []
         with code_of_others("the environment"):
-            observation, info = env.reset(seed=spec.reset_seed(reset_seed), options=spec.reset_options)
+            observation, info = env.reset(seed=spec.reset_seed(reset_seed), options=deepcopy(spec.reset_options))
             outcome = Outcome(env.unwrapped, observation, math.nan, False, info)
             if rule(outcome):
                 self.ending = "goal"

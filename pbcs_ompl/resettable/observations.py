@@ -1,5 +1,6 @@
 """Observations as vectors: what the environment reports, as policies see it."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import gymnasium
@@ -9,6 +10,8 @@ from gymnasium import spaces
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.bounds import widened
 
+EMPTY = np.empty(0)
+
 
 def flat(observation: Any) -> Array:
     """Return an observation as one vector.
@@ -16,10 +19,8 @@ def flat(observation: Any) -> Array:
     The entries of a dictionary follow each other in the order of their names, those of a tuple in their order; each
     element of a `Discrete` space is one number (`gymnasium.wrappers.FlattenObservation` makes one-hot vectors of them).
     """
-    if isinstance(observation, dict):
-        return np.concatenate([np.empty(0), *(flat(observation[key]) for key in sorted(observation))])
-    if isinstance(observation, tuple):
-        return np.concatenate([np.empty(0), *map(flat, observation)])
+    if isinstance(observation, dict | tuple):
+        return np.concatenate([EMPTY, *_leaves(observation)])
     return np.array(observation, dtype=np.float64).ravel()
 
 
@@ -77,3 +78,15 @@ def _part_bounds(space: gymnasium.Space[Any]) -> tuple[Array, Array]:
     if isinstance(space, spaces.MultiBinary):
         return np.zeros(size), np.ones(size)
     return np.full(size, -np.inf), np.full(size, np.inf)
+
+
+def _leaves(observation: Any) -> Iterator[Array]:
+    """Yield the vectors that `flat` puts one after the other."""
+    if isinstance(observation, dict):
+        for key in sorted(observation):
+            yield from _leaves(observation[key])
+    elif isinstance(observation, tuple):
+        for part in observation:
+            yield from _leaves(part)
+    else:
+        yield np.asarray(observation, dtype=np.float64).ravel()

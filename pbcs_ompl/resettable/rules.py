@@ -6,11 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pbcs_ompl.core.errors import InvalidOption, did_you_mean
+from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, did_you_mean
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rule_language import WORDS, Values, parse_conditions, parse_values
+from pbcs_ompl.resettable.simulation import simulation_of
+from pbcs_ompl.resettable.task_env import bare
 
 
 class Outcome(NamedTuple):
@@ -27,6 +29,8 @@ class Outcome(NamedTuple):
     """The observation below wrappers that flatten it, in which a feature finds the goals by their names."""
 
 
+SUCCESS = ("is_success", "success")
+"""The keys of `info` in which environments report success, the first that is there."""
 GoalRule = Callable[[Outcome], bool]
 FeatureRule = Callable[[Outcome], Array]
 
@@ -34,10 +38,14 @@ EXAMPLES = {"goal": "'reward>0' or 'qpos[0]>=0.45 and |qvel[0]|<0.1'", "feature"
 
 
 def reported_success(outcome: Outcome) -> bool:
-    """Return what the environment reports: `is_success`, `success`, else terminated with a positive reward."""
-    for key in ("is_success", "success"):
+    """Return what the environment reports: `is_success`, `success`, else terminated with a positive reward.
+
+    Raises:
+        CallbackFailed: it reports what is neither true nor false.
+    """
+    for key in SUCCESS:
         if key in outcome.info:
-            return bool(outcome.info[key])
+            return _truth(key, outcome.info[key])
     return bool(outcome.terminated and outcome.reward > 0)
 
 
@@ -47,13 +55,24 @@ def granted_success(outcome: Outcome) -> bool:
     An environment with `goal_distance`, `goal_threshold` and `get_env_state` (see `attributes`) whose `info` says
     nothing is asked for the distance of the state that it is in.
     """
-    if "is_success" in outcome.info or "success" in outcome.info:
+    if any(key in outcome.info for key in SUCCESS):
         return reported_success(outcome)
     offered = EnvAttributes.of(outcome.env)
     if offered.goal_distance is None:
         return reported_success(outcome)
     state = np.array(outcome.env.get_env_state(), dtype=np.float64)
     return bool(offered.goal_distance(state[None])[0] < (offered.goal_threshold or 0.0))
+
+
+def _truth(key: str, value: Any) -> bool:
+    """Return a success as one flag; None and NaN are none."""
+    if value is None:
+        return False
+    array = np.asarray(value)
+    if array.dtype.kind not in "biuf" or array.size != 1:
+        raise CallbackFailed(f"info[{key!r}] is {value!r}; expected True or False")
+    number = float(array.item())
+    return number != 0.0 and not np.isnan(number)
 
 
 def rule_text(kind: str, rule: str | GoalRule | FeatureRule) -> str:
@@ -145,9 +164,10 @@ def _found(module: str, name: str) -> Any:
 
 
 def _simulated(env: Any) -> Any:
-    data = getattr(env, "data", None)
+    simulation = simulation_of(env)
+    data = getattr(env, "data", None) if simulation is None else simulation.data
     if not hasattr(data, "qpos"):
-        raise InvalidOption(f"{type(env).__name__} is no MuJoCo environment: it has neither qpos nor qvel")
+        raise InvalidOption(f"{type(bare(env)).__name__} is no MuJoCo environment: it has neither qpos nor qvel")
     return data
 
 

@@ -27,6 +27,11 @@ FAMILIES = ("gymnasium_robotics", "highway_env", "PyFlyt.gym_envs", "panda_gym",
 VERDICTS = ("exact", "visited only", "refused", "failed", "not installed")
 SIDE_BY_SIDE = 2
 TIME_OUT = 60.0
+MEMORY = 6 * 2**30
+"""Bytes that a process may hold in private memory."""
+OUT_OF_MEMORY = f"needs more than {MEMORY >> 30} GiB of memory"
+ALLOCATION_FAILED = re.compile("MemoryError|bad_alloc|allocate memory|out of memory", re.IGNORECASE)
+"""What Python, C++ and MuJoCo say when memory is refused."""
 NUMBERED = re.compile(r"(.*)-v(\d+)")
 
 
@@ -114,9 +119,16 @@ def _check_apart(name: str, module: str, seconds: float) -> Record:
             return {**common, **nothing("failed", f"not done after {seconds:g} s"), "seconds": seconds}
         if answer.exists():
             return {**common, **read_json(answer)}
-        last = (ended.stderr.decode(errors="replace").strip().splitlines() or ["no word"])[-1]
-        return {**common, **nothing("failed", f"the process ended with status {ended.returncode}: {last[:200]}"),
-                "seconds": None}
+        return {**common, **nothing("failed", _last_words(ended)), "seconds": None}
+
+
+def _last_words(ended: subprocess.CompletedProcess[bytes]) -> str:
+    """Return why a process that left no record has ended."""
+    said = ended.stderr.decode(errors="replace").strip()
+    if ALLOCATION_FAILED.search(said):
+        return OUT_OF_MEMORY
+    last = (said.splitlines() or ["no word"])[-1]
+    return f"the process ended with status {ended.returncode}: {last[:200]}"
 
 
 def nothing(verdict: str, why: str) -> Record:

@@ -1,6 +1,7 @@
 """One environment of the survey, in this process: `python -m pbcs_ompl.resettable.survey_one MODULE:ID FILE`."""
 
 import os
+import resource
 import sys
 import threading
 import time
@@ -13,7 +14,7 @@ from pbcs_ompl.core.errors import MissingDependency, NotResettable, PbcsError, U
 from pbcs_ompl.resettable.adapters.visited import VisitedEnv
 from pbcs_ompl.resettable.check import check_resettable
 from pbcs_ompl.resettable.make import make
-from pbcs_ompl.resettable.survey import Record, nothing
+from pbcs_ompl.resettable.survey import MEMORY, OUT_OF_MEMORY, Record, nothing
 from pbcs_ompl.results.files import write_json
 
 STATES = 20
@@ -38,6 +39,8 @@ def _classify(env_id: str) -> Record:
         return nothing("failed", str(error))
     except ModuleNotFoundError as error:
         return nothing("not installed", str(error))
+    except MemoryError:
+        return nothing("failed", OUT_OF_MEMORY)
     except Exception as error:  # a foreign environment may raise anything: a finding of the survey
         return nothing("failed", f"{type(error).__name__}: {error}")
     report = check_resettable(model)
@@ -85,4 +88,5 @@ def _end_with_parent() -> None:
 
 if __name__ == "__main__":
     _end_with_parent()
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     write_json(Path(sys.argv[2]), classify(sys.argv[1]))

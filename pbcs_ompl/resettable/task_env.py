@@ -1,5 +1,6 @@
 """An environment as the task has it: seen through the wrappers that transform, reset with the task's options."""
 
+from copy import deepcopy
 from typing import Any
 
 import gymnasium
@@ -11,8 +12,8 @@ from pbcs_ompl.resettable.observations import flat, flat_bounds, unflat
 
 BATCHED = frozenset({"transition", "step_one", "compiled_step", "advance_towards"})
 """What works on controls below all wrappers."""
-OWN = frozenset({"bare", "top", "layers", "kept", "flatten", "reset_options", "spec", "render_mode", "metadata",
-                 "action_space", "observation_space"})
+OWN = frozenset({"bare", "top", "layers", "kept", "flatten", "_options", "reset_options", "spec", "render_mode",
+                 "metadata", "action_space", "observation_space"})
 
 
 class Kept(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -51,7 +52,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
                  flatten: bool = False):
         self.bare, self.top, self.layers, self.kept = kept.env, top, layers, kept
         self.spec, self.render_mode, self.metadata = spec, kept.render_mode, kept.metadata
-        self.reset_options, self.flatten = reset_options, flatten
+        self._options, self.flatten = reset_options, flatten
         self.action_space = explored_actions(top)
         self.observation_space: Any = top.observation_space
         if flatten:
@@ -59,13 +60,18 @@ class TaskEnv(gymnasium.Env[Any, Any]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset the environment."""
-        observation, info = self.top.reset(seed=seed, options=self.reset_options if options is None else options)
+        observation, info = self.top.reset(seed=seed, options=deepcopy(self._options if options is None else options))
         return self._shaped(observation), info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Make one step of the environment."""
         observation, reward, terminated, truncated, info = self.top.step(action)
         return self._shaped(observation), reward, terminated, truncated, info
+
+    @property
+    def reset_options(self) -> dict[str, Any] | None:
+        """What a reset gets that is given no options: a copy, because the environment may change it."""
+        return deepcopy(self._options)
 
     def seen(self, observation: Any) -> Any:
         """Return what the wrappers make of an observation of the environment within."""

@@ -32,8 +32,32 @@ PLAN, CHECKPOINT, CHAIN, FOLLOWER = "plan.json", "checkpoint.npz", "chain", "fol
 RUNS, FIGURES = "runs", "figures"
 """pbcs compare and pbcs study: the folders of the records, and of the pictures of a study."""
 Content = TypeVar("Content")
+VIEW = "view.html"
+"""pbcs view: tree, plan and controller in three dimensions."""
+HEAD_BYTES = 1024
 MOST_BYTES, MOST_ARRAY_BYTES, MOST_ARRAYS = 1 << 28, 1 << 33, 100_000
 """What is read of one file, so that a small file of another person does not fill the memory."""
+
+
+def check_replaceable(page: Path, mark: str, maker: str) -> None:
+    """Refuse to replace a file that is not an older page of ours.
+
+    Args:
+        page: What is to be written.
+        mark: What the first `HEAD_BYTES` of a page of ours hold.
+        maker: The command that writes such pages, for the message.
+
+    Raises:
+        RunFolderError: there is something else.
+    """
+    if page.is_dir():
+        raise RunFolderError(f"cannot write {page}: it is a folder; name a file")
+    if page.exists() and not page.is_file():
+        raise RunFolderError(f"cannot write {page}: it is no regular file; choose another --out")
+    if page.exists():
+        with open(page, "rb") as file:
+            if mark.encode() not in file.read(HEAD_BYTES):
+                raise RunFolderError(f"{page} was not written by {maker}; choose another --out, or remove it first")
 
 
 @contextmanager

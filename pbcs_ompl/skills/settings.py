@@ -121,7 +121,9 @@ class EpisodeSettings(Settings):
         beta: Episodes of a session and of a test ([Matheron2020] Alg. 7 and 8; 50 in chapter 7).
         epsilon: Fraction of random actions while collecting experience ([Matheron2020] chapter 7).
         test_epsilon: Fraction of random actions in tests ([Matheron2020]: 0).
-        max_steps: Longest episode of a skill, in steps ([Matheron2020] chapter 7).
+        max_steps: Longest episode of a skill, in steps ([Matheron2020] chapter 7); 0 for the environment's limit.
+        steps_per_waypoint: Where this number times the waypoints from a start to the target is more than `max_steps`,
+            it is the limit instead, up to the environment's (ours; 0 for none).
         updates_per_transition: Gradient steps for each collected transition ([Matheron2020] Alg. 8).
         episodes_per_batch: Episodes that run side by side between updates ([Matheron2020] Alg. 8: 1).
         shaped: Train on the shaped reward ([Matheron2020] 7.2.3) instead of the environment's own.
@@ -132,22 +134,25 @@ class EpisodeSettings(Settings):
     epsilon: float = 0.1
     test_epsilon: float = 0.0
     max_steps: int = 50
+    steps_per_waypoint: float = 0.0
     updates_per_transition: float = 1.0
     episodes_per_batch: int = 1
     shaped: bool = True
     success_reward: float = 10.0
 
     def _check_ranges(self) -> None:
-        self._check_counts("beta", "max_steps", "episodes_per_batch")
+        self._check_counts("beta", "episodes_per_batch")
+        self._check("at least 0", lambda value: value >= 0, "max_steps", "steps_per_waypoint")
         self._check_fractions("epsilon", "test_epsilon")
         self._check_positive("updates_per_transition")
 
 
 @dataclass(frozen=True)
 class StartSettings(Settings):
-    """Where episodes start: in a ball around a state.
+    """Where episodes start: in a ball around a state, or in that state.
 
     Attributes:
+        exact: Episodes start exactly in the state ([Matheron2020] chapter 5), else in the ball around it (7.2.4).
         radius: Radius of start balls, activation sets and local goals, in the environment's distance (epsilon of
             [Matheron2020] 7.2).
         reject_invalid: Draw again when a start state is invalid; [Matheron2020] keeps it.
@@ -155,6 +160,7 @@ class StartSettings(Settings):
             not be a state (ours, not tuned).
     """
 
+    exact: bool = False
     radius: float = 0.1
     reject_invalid: bool = True
     rollout_steps: int = 5

@@ -5,8 +5,6 @@ from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.exploration import explore
 from pbcs_ompl.skills.method import Snapshot
@@ -22,6 +20,7 @@ class SinglePolicyState:
         start: The waypoint where episodes start.
         sessions: Sessions at this place so far.
         tested: Whether this start point has been tested since the last change.
+        success_rate: Of the last session or test.
         solved: Whether the policy has passed its last test, from waypoint 0.
         filled: Whether the replay buffer has been filled beforehand, by methods that do so.
     """
@@ -29,6 +28,7 @@ class SinglePolicyState:
     start: int
     sessions: int = 0
     tested: bool = False
+    success_rate: float = 0.0
     solved: bool = False
     filled: bool = False
 
@@ -66,21 +66,37 @@ class SinglePolicy(ABC):
 
     @property
     def standing(self) -> str:
-        """How far training has come, in words."""
-        return f"{self.covered:.0%} of the plan covered"
+        """How far training has come, in words, and what stands in the way."""
+        return f"{self.covered:.0%} of the plan covered; {self._obstacle}"
+
+    @property
+    def _obstacle(self) -> str:
+        """The start point that training has not passed yet, in words."""
+        start, trainer = self.state.start, self.trainer
+        place = trainer.waypoints.states[start:start + 1]
+        return (f"from its waypoint {start}, {float(trainer.model.goal_distance(place)[0]):.3g} from the goal, "
+                f"{self.state.success_rate:.0%} of the last episodes of at most {trainer.limit(start)} steps succeeded")
 
     @property
     def longest_step(self) -> int:
         """The most transitions that the next step may take: those of a session, and of drawing its start states."""
-        return sys.maxsize if self.done else 2 * self.trainer.settings.beta * self.trainer.settings.max_steps
+        return sys.maxsize if self.done else 2 * self.trainer.settings.beta * self.trainer.limit(0)
 
     def chain(self, steps_per_skill: int) -> SkillChain:
         """Return the policy as a chain of one skill.
 
         Args:
-            steps_per_skill: Time limit of an execution.
+            steps_per_skill: Time limit of an execution, if that is more than the environment's.
         """
-        return SkillChain.of(self.skills, self.trainer.waypoints, steps_per_skill)
+        return SkillChain.of(self.skills, self.trainer.waypoints,
+                             max(steps_per_skill, self.trainer.model.max_episode_steps))
+
+    def _train_at(self, start: int, rehearsal_fraction: float = 0.0) -> None:
+        self.state.success_rate = self.trainer.session(start, rehearsal_fraction)
+
+    def _passes(self, start: int) -> bool:
+        self.state.success_rate = self.trainer.test(start)
+        return self.state.success_rate == 1.0
 
     def snapshot(self) -> Snapshot:
         """Return everything needed to resume bit for bit."""
@@ -117,7 +133,8 @@ class PBSettings(PlannedSettings):
 class PB(SinglePolicy):
     """Plan, Backplay: the start moves back as soon as every test episode succeeds.
 
-    Source: [Matheron2020] section 5.3, Fig. 5.1(a), and with `pretest` Fig. 5.1(b). Differs: `rehearsal_fraction`.
+    Source: [Matheron2020] section 5.3, Fig. 5.1(a), and with `pretest` Fig. 5.1(b). Differs: `rehearsal_fraction`;
+    starts in balls unless `exact`, which is the thesis.
     """
 
     def __init__(self, trainer: SkillTrainer, settings: PBSettings):
@@ -128,10 +145,10 @@ class PB(SinglePolicy):
         """Test the start point (before training too, with `pretest`), or train there for a session."""
         state = self.state
         if state.tested or (state.sessions == 0 and not self.settings.pretest):
-            self.trainer.session(state.start, self.settings.rehearsal_fraction)
+            self._train_at(state.start, self.settings.rehearsal_fraction)
             state.sessions += 1
             state.tested = False
-        elif self.trainer.test(state.start) == 1.0:
+        elif self._passes(state.start):
             state.solved = state.start == 0
             state.start = max(0, state.start - self.settings.min_stride)
             state.sessions = 0
@@ -159,8 +176,8 @@ class BackplaySettings(PlannedSettings):
 class SlidingWindow(SinglePolicy):
     """The original Backplay: start points are drawn from a window that slides back on a schedule.
 
-    Source: Resnick et al. 2018, as in [Matheron2020] section 5.2. Differs: once the window has reached the start, the
-    policy is tested there after every session and training continues until it passes.
+    Source: Resnick et al. 2018, as in [Matheron2020] section 5.2. Differs: starts in balls unless `exact`; once the
+    window has reached the start, the policy is tested there after every session and training continues until it passes.
     """
 
     def __init__(self, trainer: SkillTrainer, settings: BackplaySettings):
@@ -173,10 +190,10 @@ class SlidingWindow(SinglePolicy):
         state, trainer = self.state, self.trainer
         if state.tested:
             state.tested = False
-            state.solved = trainer.test(0) == 1.0
+            state.solved = self._passes(0)
             return
         end = min(state.start + self.width, trainer.waypoints.last)
-        trainer.session_from(trainer.rng.integers(state.start, end, trainer.settings.beta))
+        state.success_rate = trainer.session_from(trainer.rng.integers(state.start, end, trainer.settings.beta))
         state.sessions += 1
         if state.start == 0:
             state.tested = True
@@ -190,7 +207,10 @@ class PlainSettings(MethodSettings):
 
 
 class Plain(SinglePolicy):
-    """The agent alone: every episode starts at the environment's start, nothing of the plan is used."""
+    """The agent alone: nothing of a plan is used.
+
+    Every episode starts at the environment's start, as in [Matheron2020] 5.6, or in the ball around it unless `exact`.
+    """
 
     def __init__(self, trainer: SkillTrainer, settings: MethodSettings):
         super().__init__(trainer)
@@ -200,19 +220,24 @@ class Plain(SinglePolicy):
         """0 or 1: there is no plan."""
         return float(self.done)
 
+    @property
+    def standing(self) -> str:
+        """What stands in the way, in words."""
+        return f"no policy that passes its test: {self._obstacle}"
+
     def step(self) -> None:
         """Train for a session from the start, then test there."""
         state = self.state
         if state.tested:
             state.tested = False
-            state.solved = self.trainer.test(0) == 1.0
+            state.solved = self._passes(0)
         else:
             self._train()
             state.sessions += 1
             state.tested = True
 
     def _train(self) -> None:
-        self.trainer.session_from(np.zeros(self.trainer.settings.beta, dtype=np.int64))
+        self._train_at(0)
 
 
 @dataclass(frozen=True)
@@ -268,4 +293,4 @@ class Offline(Bootstrapped):
 
     def _train(self) -> None:
         settings = self.trainer.settings
-        self.trainer.agent.train(round(settings.beta * settings.max_steps * settings.updates_per_transition))
+        self.trainer.agent.train(round(settings.beta * self.trainer.limit(0) * settings.updates_per_transition))

@@ -1,6 +1,7 @@
 """Trains one agent for one skill after another along the waypoints of a plan."""
 
 from collections.abc import Callable
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -79,13 +80,21 @@ class SkillTrainer:
         actions: Array = self.agent.explore(self._observe(states)[None])[0]
         return actions
 
+    def limit(self, index: int) -> int:
+        """Return the longest episode from waypoint `index` to the target, in steps."""
+        longest, settings = self.model.max_episode_steps, self.settings
+        along = ceil(settings.steps_per_waypoint * (self.end_index - index))
+        return max(settings.max_steps or longest, min(along, longest))
+
     def test(self, index: int) -> float:
-        """Return the success rate of beta episodes from the ball of waypoint `index`."""
-        starts = self.waypoints.draw_starts(np.full(self.settings.beta, index), self.rng, self.counter)
-        return self._run(self.act, starts, self.settings.test_epsilon).success_rate
+        """Return the success rate of beta episodes from waypoint `index`; of one, where all would be the same."""
+        settings = self.settings
+        same = self.waypoints.starts.exact and settings.test_epsilon == 0.0
+        starts = self.waypoints.draw_starts(np.full(1 if same else settings.beta, index), self.rng, self.counter)
+        return self._run(self.act, starts, settings.test_epsilon, self.limit(index)).success_rate
 
     def session(self, index: int, rehearsal_fraction: float = 0.0) -> float:
-        """Train on beta episodes from the ball of waypoint `index`; return their success rate.
+        """Train on beta episodes from waypoint `index`; return their success rate.
 
         Args:
             index: Where episodes start.
@@ -99,7 +108,7 @@ class SkillTrainer:
         return self.session_from(indices)
 
     def session_from(self, indices: IndexArray) -> float:
-        """Train on one episode from the ball of each waypoint in `indices`; return their success rate.
+        """Train on one episode from each waypoint in `indices`; return their success rate.
 
         Updates follow each batch of `episodes_per_batch` episodes.
         """
@@ -107,7 +116,7 @@ class SkillTrainer:
         for first in range(0, len(indices), self.settings.episodes_per_batch):
             batch = indices[first:first + self.settings.episodes_per_batch]
             starts = self.waypoints.draw_starts(batch, self.rng, self.counter)
-            episodes = self._run(self.explore, starts, self.settings.epsilon)
+            episodes = self._run(self.explore, starts, self.settings.epsilon, self.limit(int(batch.min())))
             self.add_transitions(episodes.states, episodes.controls, episodes.rewards, episodes.next_states,
                                  episodes.terminals)
             self.train(episodes.transitions)
@@ -130,8 +139,9 @@ class SkillTrainer:
         """
         ball = self.waypoints.ball(start_index)
         around = self.rng.choice(self.waypoints.near(start_index), settings.samples)
-        starts = self.waypoints.draw_starts(around, self.rng, self.counter)
-        episodes = self._run(lambda states: policy.act(self.model.observe(states)), starts, self.settings.test_epsilon)
+        starts = self.waypoints.draw_near(around, self.rng, self.counter)
+        episodes = self._run(lambda states: policy.act(self.model.observe(states)), starts, self.settings.test_epsilon,
+                             self.limit(start_index))
         return learn_set(self.model.observe(starts), episodes.reached, ball, settings, int(self.rng.integers(2**31)))
 
     def skill(self, start_index: int, policy: SkillPolicy) -> Skill:
@@ -142,7 +152,7 @@ class SkillTrainer:
         """Return the distance of states as weights of observations, if observations show it (`observed_metric`)."""
         waypoints, rng = self.waypoints, np.random.default_rng(0)
         some = np.linspace(0, waypoints.last, METRIC_SAMPLES).astype(np.int64)
-        states = np.concatenate([waypoints.states[np.unique(some)], waypoints.draw_starts(some, rng, self.counter)])
+        states = np.concatenate([waypoints.states[np.unique(some)], waypoints.draw_near(some, rng, self.counter)])
         return observed_metric(self.model, states, waypoints.starts.radius)
 
     def entry(self, start_index: int, activation: ActivationSet, metric: Array | None,
@@ -171,7 +181,7 @@ class SkillTrainer:
         waypoints, rng = self.waypoints, self.rng
         around = np.concatenate([np.full(settings.samples, start_index),
                                  rng.integers(0, waypoints.last + 1, settings.samples)])
-        states = np.concatenate([waypoints.states, waypoints.draw_starts(around, rng, self.counter)])
+        states = np.concatenate([waypoints.states, waypoints.draw_near(around, rng, self.counter)])
         learnt = learn_set(self.model.observe(states), activation.contains(self.model, states),
                            waypoints.ball(start_index), settings, int(rng.integers(2**31)))
         return ObservedClassifier.of(learnt)
@@ -201,10 +211,10 @@ class SkillTrainer:
     def _observe(self, states: Array) -> Array:
         return self.transform(self.model.observe(states))
 
-    def _run(self, act: Act, starts: Array, epsilon: float) -> Episodes:
+    def _run(self, act: Act, starts: Array, epsilon: float, max_steps: int) -> Episodes:
         settings = self.settings
-        return run_episodes(self.model, act, self.target, starts, epsilon=epsilon, max_steps=settings.max_steps,
-                            rng=self.rng, success_reward=settings.success_reward if settings.shaped else None,
+        return run_episodes(self.model, act, self.target, starts, epsilon=epsilon, max_steps=max_steps, rng=self.rng,
+                            success_reward=settings.success_reward if settings.shaped else None,
                             counter=self.counter)
 
     def train(self, transitions: int) -> None:

@@ -78,7 +78,14 @@ class Waypoints:
                                              self.model.observe(self.states), self.plan.observation_horizon)
 
     def draw_starts(self, indices: IndexArray, rng: np.random.Generator, counter: Counter | None = None) -> Array:
-        """Draw one start state in the ball of each index.
+        """Draw one start state of an episode for each index: in its ball, or its state where starts are exact.
+
+        See `draw_near` for arguments and result.
+        """
+        return self.states[indices] if self.starts.exact else self.draw_near(indices, rng, counter)
+
+    def draw_near(self, indices: IndexArray, rng: np.random.Generator, counter: Counter | None = None) -> Array:
+        """Draw one state in the ball of each index.
 
         Args:
             indices: Waypoints [B].

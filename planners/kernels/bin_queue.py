@@ -7,6 +7,7 @@ Differs from [Matheron2020] Alg. 5: the hash tables W_b, B_s, B_m of lists becom
 
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
@@ -15,21 +16,39 @@ from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import GROWTH, resized_copy
 from pbcs_ompl.planners.kernels.cells import cell_of, find_cell, rehash
 from pbcs_ompl.planners.kernels.memory import uncounted
-from pbcs_ompl.planners.kernels.runs import LENGTH, LOWEST, SIZE, START, Number, append, choose
+from pbcs_ompl.planners.kernels.runs import (
+    FREE_RUN,
+    HEAD,
+    RUN,
+    RUNS,
+    Heads,
+    Members,
+    Number,
+    Runs,
+    append,
+    choose,
+)
 from pbcs_ompl.planners.kernels.slices import CLASSES, SMALLEST, double, rows_needed, take
+
+RUNS_A_NODE = 4
+"""The most new runs when a bin and a node of it are chosen, and a node and its bin are added."""
 
 
 class BinQueue(NamedTuple):
     """The arrays. R rows of the pool, M rows for bins, F features, H hash cells (a power of two)."""
 
-    pool: NDArray[np.int32]
-    """Node queues of all bins [R, 3]."""
-    heads: NDArray[np.int32]
-    """The head of each bin's queue [M, 4]."""
-    order: NDArray[np.int32]
-    """The queue of the bins [M, 3]."""
-    head: NDArray[np.int32]
-    """Its head [1, 4]; its length is the number of bins."""
+    pool: Members
+    """Node queues of all bins [R]."""
+    heads: Heads
+    """The head of each bin's queue [M, 7]."""
+    order: Members
+    """The queue of the bins [M]."""
+    head: Heads
+    """Its head [1, 7]; its length is the number of bins."""
+    runs: Runs
+    """The runs of all queues but the lowest of each [K, 4]."""
+    totals: NDArray[np.int64]
+    """Runs ever used, and the first free one [2]."""
     cells: NDArray[np.int64]
     """Integer coordinates of each bin [M, F]."""
     table: NDArray[np.int32]
@@ -42,29 +61,33 @@ class BinQueue(NamedTuple):
     @property
     def num_bins(self) -> int:
         """Number of bins."""
-        return int(self.head[0, LENGTH])
+        return int(self.head['length'][0])
 
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays; rows that were never written to are not counted."""
         by_bin = self.heads, self.order, self.cells
         return (self.pool[:self.used[0]].nbytes + sum(array[:self.num_bins].nbytes for array in by_bin)
-                + self.table.nbytes + self.head.nbytes + self.free.nbytes + self.used.nbytes)
+                + self.runs[:self.totals[RUNS]].nbytes + self.table.nbytes)
 
 
 _integers = types.int64[:, ::1]
 _entries = types.int32[:, ::1]
-QUEUE_TYPE = types.NamedTuple((_entries, _entries, _entries, _entries, _integers, types.int32[::1],
-                               types.int32[::1], types.int64[::1]), BinQueue)
+_vector = types.int32[::1]
+_heads, _runs = (numba.from_dtype(kind)[::1] for kind in (HEAD, RUN))
+_totals = types.int64[::1]
+QUEUE_TYPE = types.NamedTuple((_vector, _heads, _vector, _heads, _runs, _totals, _integers, _vector, _vector,
+                               _totals), BinQueue)
 """Numba's type of BinQueue."""
 
 
 def empty_queue(num_features: int) -> BinQueue:
     """Return a queue without bins; its rows cost no memory until they are written to."""
-    bins, rows = 1 << 10, 1 << 14
+    bins, rows, totals = 1 << 10, 1 << 14, np.zeros(2, np.int64)
+    totals[FREE_RUN] = -1
     return BinQueue(
-        pool=np.empty((rows, 3), np.int32), heads=np.empty((bins, 4), np.int32),
-        order=np.empty((bins, 3), np.int32), head=np.zeros((1, 4), np.int32),
+        pool=np.empty(rows, np.int32), heads=np.empty(bins, HEAD), order=np.empty(bins, np.int32),
+        head=np.zeros(1, HEAD), runs=np.empty(rows, RUN), totals=totals,
         cells=np.empty((bins, num_features), np.int64), table=np.zeros(4 * bins, np.int32),
         free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64))
 
@@ -81,7 +104,7 @@ def insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool
 
 
 def reserve(queue: BinQueue, count: int) -> BinQueue:
-    """Return the queue with space for `count` more nodes, whichever bins they are in; space costs no memory."""
+    """Return the queue with space for `count` more nodes and choices, whichever bins they are in."""
     bins = queue.num_bins
     if bins + count > len(queue.heads):
         most = max(GROWTH * len(queue.heads), bins + count)
@@ -90,31 +113,46 @@ def reserve(queue: BinQueue, count: int) -> BinQueue:
         rehash(cells, table, bins)
         queue = queue._replace(heads=resized_copy(queue.heads, bins, most), cells=cells, table=table,
                                order=resized_copy(queue.order, bins, most))
+    runs = int(queue.totals[RUNS]) + RUNS_A_NODE * count
+    if runs > len(queue.runs):
+        queue = queue._replace(runs=resized_copy(queue.runs, int(queue.totals[RUNS]),
+                                                 max(GROWTH * len(queue.runs), runs)))
     rows = rows_needed(queue.used, count)
     if rows > len(queue.pool):
         queue = queue._replace(pool=resized_copy(queue.pool, int(queue.used[0]), max(GROWTH * len(queue.pool), rows)))
     return queue
 
 
+def select(queue: BinQueue, uniforms: NDArray[np.float64], nodes: NDArray[np.int64]) -> BinQueue:
+    """Write into `nodes` [B] as many selections in a row, by numbers uniform in [0, 1) [B, 2]: bin, node.
+
+    Returns:
+        The queue; that which was passed is not to be used any more.
+    """
+    queue = reserve(queue, len(nodes))
+    _select(queue, uniforms, nodes)
+    return queue
+
+
 @njit()
-def select(queue: BinQueue, uniforms: NDArray[np.float64], nodes: NDArray[np.int64]) -> None:
-    """Write into `nodes` [B] as many selections in a row, by numbers uniform in [0, 1) [B, 2]: bin, node."""
-    pool, heads, order, head = queue.pool, queue.heads, queue.order, queue.head
+def _select(queue: BinQueue, uniforms: NDArray[np.float64], nodes: NDArray[np.int64]) -> None:
+    pool, heads, order, head, runs, totals = queue.pool, queue.heads, queue.order, queue.head, queue.runs, queue.totals
     for i in range(len(nodes)):
-        nodes[i] = choose(pool, heads, choose(order, head, 0, uniforms[i, 0]), uniforms[i, 1])
+        number = choose(order, head, runs, totals, 0, uniforms[i, 0])
+        nodes[i] = choose(pool, heads, runs, totals, number, uniforms[i, 1])
 
 
 def tied_bins(queue: BinQueue) -> int:
     """Return how many bins share the lowest count."""
-    return int(queue.head[0, LENGTH] - queue.head[0, LOWEST])
+    return int(queue.head['length'][0] - queue.head['first'][0])
 
 
 @njit(inline="always")
-def add(pool: NDArray[np.int32], heads: NDArray[np.int32], number: Number, node: Number) -> bool:
+def add(pool: Members, heads: Heads, runs: Runs, totals: NDArray[np.int64], number: Number, node: Number) -> bool:
     """Add a node of count 0 to a bin; return False where the bin is full, or there is none (number -1)."""
-    if number < 0 or heads[number, LENGTH] == 1 << heads[number, SIZE]:
+    if number < 0 or heads[number].length == 1 << heads[number].size:
         return False
-    append(pool, heads, number, node)
+    append(pool, heads, runs, totals, number, node)
     return True
 
 
@@ -126,9 +164,9 @@ def grow_and_add(queue: BinQueue, cell: NDArray[np.int64], place: Number, node: 
     if number < 0:
         number = _new_bin(queue, cell, place)
     else:
-        size = np.int64(heads[number, SIZE])
-        heads[number, START], heads[number, SIZE] = double(pool, free, used, heads[number, START], size), size + 1
-    append(pool, heads, number, node)
+        size = np.int64(heads[number].size)
+        heads[number].start, heads[number].size = double(pool, free, used, heads[number].start, size), size + 1
+    append(pool, heads, queue.runs, queue.totals, number, node)
 
 
 @njit()
@@ -141,19 +179,19 @@ def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.boo
         if not skip[row]:
             cell_of(features, row, size, cell)
             place = find_cell(cells, table, cell)
-            if not add(pool, heads, table[place] - 1, first + row):
+            if not add(pool, heads, queue.runs, queue.totals, table[place] - 1, first + row):
                 grow_and_add(queue, cell, place, first + row)
 
 
 @njit()
 def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: Number) -> Number:
     """Open a bin at a place of the hash table."""
-    number: Number = np.int64(queue.head[0, LENGTH])
+    number: Number = np.int64(queue.head[0].length)
     heads, cells = queue.heads, queue.cells
-    heads[number, START] = take(queue.pool, queue.free, queue.used, SMALLEST)
-    heads[number, LENGTH], heads[number, SIZE] = 0, SMALLEST
+    heads[number].start = take(queue.pool, queue.free, queue.used, SMALLEST)
+    heads[number].length, heads[number].size = 0, SMALLEST
     for axis in range(len(cell)):
         cells[number, axis] = cell[axis]
     queue.table[place] = number + 1
-    append(queue.order, queue.head, 0, number)
+    append(queue.order, queue.head, queue.runs, queue.totals, 0, number)
     return number

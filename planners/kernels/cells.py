@@ -1,7 +1,4 @@
-"""A hash table of cells: integer coordinates of bins to their numbers, open addressing, 0 for an empty place.
-
-The hash is linear in the coordinates up to its last step, so that the hash of a neighbour is one addition away.
-"""
+"""A hash table of cells: integer coordinates of bins to their numbers, open addressing, 0 for an empty place."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +9,8 @@ from pbcs_ompl.planners.kernels.runs import Number
 
 FARTHEST = 4.6e18  # cells beyond this coordinate are one cell: int64 ends there
 WEIGHT = np.uint64(0x9E3779B97F4A7C15)
+PROBE = 17
+"""How far to the next place where one is taken: odd, so that all are tried, and in the next line of the cache."""
 
 
 @njit(inline="always", error_model="numpy")
@@ -22,35 +21,31 @@ def cell_of(features: Array, row: Number, size: Array, cell: NDArray[np.int64]) 
 
 
 @njit(inline="always")
-def linear_hash(cell: NDArray[np.int64]) -> np.uint64:
-    """Return the sum of cell[axis] WEIGHT**(axis + 1), modulo 2**64."""
+def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[np.int64]) -> Number:
+    """Return the position in `table` of a cell, or of the empty place where it belongs.
+
+    Cells that agree in all but the last two bits of their first two coordinates lie within 16 places, a line of the
+    cache: most neighbours of a cell are found where it is.
+    """
     mixed, weight = np.uint64(0), WEIGHT
     for axis in range(len(cell)):
-        mixed += np.uint64(cell[axis]) * weight
+        block = cell[axis] >> 2 if axis < 2 else cell[axis]
+        mixed += np.uint64(block) * weight
         weight *= WEIGHT
-    return mixed
-
-
-@njit(inline="always")
-def find_hashed(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[np.int64],
-                mixed: np.uint64) -> Number:
-    """Return the position in `table` of a cell with this linear hash, or of the empty place where it belongs."""
     mixed = (mixed ^ (mixed >> np.uint64(32))) * WEIGHT
-    place = np.int64((mixed >> np.uint64(32)) & np.uint64(len(table) - 1))
+    within = cell[0] & 3
+    if len(cell) > 1:
+        within |= (cell[1] & 3) << 2
+    hashed = np.int64(mixed >> np.uint64(28)) ^ within
+    place: Number = hashed & (len(table) - 1)
     while table[place] > 0:
         same = True
         for axis in range(len(cell)):
             same = same and cells[table[place] - 1, axis] == cell[axis]
         if same:
             return place
-        place = (place + 1) & (len(table) - 1)
+        place = (place + PROBE) & (len(table) - 1)
     return place
-
-
-@njit(inline="always")
-def find_cell(cells: NDArray[np.int64], table: NDArray[np.int32], cell: NDArray[np.int64]) -> Number:
-    """Return the position in `table` of a cell, or of the empty place where it belongs."""
-    return find_hashed(cells, table, cell, linear_hash(cell))
 
 
 @njit()

@@ -11,11 +11,36 @@ from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, grow
 from pbcs_ompl.planners.kernels.cells import cell_of, find_cell
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
 from pbcs_ompl.planners.kernels.memory import prefetch, uncounted
-from pbcs_ompl.planners.kernels.runs import MEMBER, choose, peek
+from pbcs_ompl.planners.kernels.runs import Heads, Members, choose, peek
 
 _matrix = types.float64[:, ::1]
 _vector = types.float64[::1]
 _integers = types.int64[::1]
+AHEAD = 16
+"""Rows that are looked at in advance; a power of two."""
+LARGE = 1 << 19
+"""Nodes from which on the tree is larger than the cache, so that it pays."""
+
+
+@njit(inline="always")
+def _fetch(row: int, uniforms: Array, ahead: IndexArray, order: Members, head: Heads, heads: Heads, pool: Members,
+           states: Array) -> None:
+    """Fetch memory that rows to come will need: of one the bin, of a nearer one its node, of the next the state.
+
+    What these will be is known unless a bin is opened before or is chosen twice; then the wrong memory is fetched.
+    """
+    rows = len(uniforms)
+    far, middle, near = row + 12, row + 8, row + 4
+    if far < rows:
+        number = order[peek(head, 0, uniforms[far, 0], 12)]
+        ahead[far & (AHEAD - 1)] = number
+        prefetch(heads, number)
+    if middle < rows:
+        place = peek(heads, ahead[middle & (AHEAD - 1)], uniforms[middle, 1], 0)
+        ahead[middle & (AHEAD - 1)] = place
+        prefetch(pool, place)
+    if near < rows:
+        prefetch(states, pool[ahead[near & (AHEAD - 1)]])
 
 
 @njit(types.Tuple((types.int64, types.boolean))(
@@ -42,27 +67,26 @@ def expand(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Index
     """
     address, reals, table, integers = uncounted(parameters)
     states, features, controls, parents, rewards, ends = uncounted(columns)
-    queue = uncounted(queue)
-    pool, heads, order, head, cells, places = queue.pool, queue.heads, queue.order, queue.head, queue.cells, queue.table
+    queue, uniforms, bounds = uncounted(queue), uncounted(uniforms), uncounted(bounds)
+    bin_size, feature_dims = uncounted(bin_size), uncounted(feature_dims)
+    pool, heads, order, head, runs, totals = queue.pool, queue.heads, queue.order, queue.head, queue.runs, queue.totals
+    cells, places = queue.cells, queue.table
     least, longest = durations
-    cell = np.empty(len(bin_size), np.int64)
-    child, end = first, first + most
+    cell, ahead = np.empty(len(bin_size), np.int64), np.zeros(AHEAD, np.int64)
+    child, end, large = first, first + most, first >= LARGE
     for row in range(len(uniforms)):
-        node = choose(pool, heads, choose(order, head, 0, uniforms[row, 0]), uniforms[row, 1])
-        # The next choice is known already unless this child opens a bin: fetch its memory while others work.
-        following = min(row + 1, len(uniforms) - 1)
-        ahead = peek(heads, order[peek(head, 0, uniforms[following, 0]), MEMBER], uniforms[following, 1])
-        prefetch(pool, ahead)
+        if large:
+            _fetch(row, uniforms, ahead, order, head, heads, pool, states)
+        node = choose(pool, heads, runs, totals, choose(order, head, runs, totals, 0, uniforms[row, 0]),
+                      uniforms[row, 1])
         steps = longest
         if longest > least:
             steps = least + int(uniforms[row, 2 + bounds.shape[1]] * (longest - least + 1))
-        for taken in range(min(steps, end - child)):
+        for _ in range(min(steps, end - child)):
             for axis in range(bounds.shape[1]):
                 low, high = bounds[0, axis], bounds[1, axis]
                 controls[child, axis] = low + (high - low) * uniforms[row, 2 + axis]
             reward, terminal, success = call_step(address, reals, table, integers, states, node, controls, child)
-            if taken == 0:
-                prefetch(states, pool[ahead, MEMBER])
             for axis in range(len(feature_dims)):
                 features[child, axis] = states[child, feature_dims[axis]]
             parents[child], rewards[child], ends[child] = node, reward, terminal
@@ -72,7 +96,7 @@ def expand(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Index
             if not terminal:
                 cell_of(features, node, bin_size, cell)
                 place = find_cell(cells, places, cell)
-                if not add(pool, heads, places[place] - 1, node):
+                if not add(pool, heads, runs, totals, places[place] - 1, node):
                     grow_and_add(queue, cell, place, node)
             if success:
                 return child - first, True

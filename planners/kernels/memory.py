@@ -37,14 +37,15 @@ def _without_owner(context: Any, builder: Any, kind: Any, array: Any) -> Any:
 
 @intrinsic
 def prefetch(typing_context: Any, array: Any, row: Any) -> Any:
-    """Fetch the first cache line of array[row] of a two-dimensional array into the cache; changes no value."""
+    """Fetch the line of the cache in which array[row] begins; changes no value, and rows out of bounds do no harm."""
     signature = types.void(array, types.intp)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array_type = signature.args[0]
         structure = context.make_array(array_type)(context, builder, arguments[0])
         first = context.get_constant(types.intp, 0)
-        pointer = cgutils.get_item_pointer(context, builder, array_type, structure, [arguments[1], first])
+        pointer = cgutils.get_item_pointer(context, builder, array_type, structure,
+                                           [arguments[1], first][:array_type.ndim])
         byte, flag = ir.PointerType(ir.IntType(8)), ir.IntType(32)
         function = cgutils.get_or_insert_function(
             builder.module, ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag]), "llvm.prefetch.p0")

@@ -1,5 +1,7 @@
 """Rides: begin one, take note of each of its steps, and both in one compiled loop."""
 
+from typing import Any
+
 import numpy as np
 from numba import types
 from numba.core.types import npy_rng
@@ -12,9 +14,9 @@ from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, call_step
 from pbcs_ompl.planners.kernels.cells import cell_of, find_cell
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
 from pbcs_ompl.planners.kernels.memory import uncounted
-from pbcs_ompl.planners.kernels.ranking import CHILD, COUNT, LENGTH, PARENT, SIBLING, START, lift, lowest
+from pbcs_ompl.planners.kernels.ranking import REGIONS, lift, lowest
 from pbcs_ompl.planners.kernels.regions import REGIONS_TYPE, Regions, add_node, key_of, open_bin
-from pbcs_ompl.planners.kernels.runs import Number, Rows
+from pbcs_ompl.planners.kernels.runs import Members, Number, Rows
 
 SCALE, KIND, PATIENCE, ACTIVE, NODE, BIN, STEPS, DRY, KNOWN, GAINS = range(10)  # columns of `rides`
 KINDS, PATIENCES = 2, 6  # uniform and surface controls; 1, 2, 4, ... 32 steps
@@ -43,29 +45,29 @@ def _draw(yields: Array, question: int, answers: int, uniform: float) -> int:
 
 
 @njit(error_model="numpy")
-def _least_child(rows: Rows, region: Number, uniform: float) -> Number:
+def _least_child(rows: Any, region: Number, uniform: float) -> Number:
     """Return a random one of the regions directly within one whose keys are lowest."""
     least, ties = np.int64(-1), 0
-    child = np.int64(rows[region, CHILD])
+    child = np.int64(rows[region].child)
     while child >= 0:
         key = np.int64(key_of(rows, child))
         if least < 0 or key < least:
             least, ties = key, 1
         elif key == least:
             ties += 1
-        child = rows[child, SIBLING]
+        child = rows[child].sibling
     left = int(uniform * ties)
-    child = np.int64(rows[region, CHILD])
+    child = np.int64(rows[region].child)
     while True:
         if key_of(rows, child) == least:
             if left == 0:
                 return child
             left -= 1
-        child = rows[child, SIBLING]
+        child = rows[child].sibling
 
 
 @njit(inline="always")
-def _begin(rows: Rows, order: Rows, runs: Rows, tails: Rows, totals: NDArray[np.int64], pool: Rows, yields: Array,
+def _begin(rows: Any, order: Rows, runs: Any, tails: Rows, totals: NDArray[np.int64], pool: Members, yields: Array,
            bounds: Array, rides: IndexArray, actions: Array, ride: int, rng: np.random.Generator) -> None:
     """Choose scale, kind, patience, a region of few rides down to a bin, one of its nodes, and a control."""
     scale = _draw(yields, SCALE, len(order), rng.random())
@@ -76,12 +78,12 @@ def _begin(rows: Rows, order: Rows, runs: Rows, tails: Rows, totals: NDArray[np.
     for _ in range(scale):
         region = _least_child(rows, region, rng.random())
     rides[ride, BIN] = region
-    rides[ride, NODE] = pool[rows[region, START] + int(rng.random() * rows[region, LENGTH]), 0]
+    rides[ride, NODE] = pool[rows[region].start + int(rng.random() * rows[region].length)]
     level = 0
     while region >= 0:
-        rows[region, COUNT] += 1  # at once, so that rides side by side begin elsewhere
+        rows[region].count += 1  # at once, so that rides side by side begin elsewhere
         lift(order, runs, tails, totals, rows, level, region, key_of(rows, region))
-        region = np.int64(rows[region, PARENT])
+        region = np.int64(rows[region].parent)
         level += 1
     largest = 0.0
     for axis in range(bounds.shape[1]):
@@ -183,7 +185,7 @@ def note(regions: Regions, yields: Array, rides: IndexArray, count: int, columns
 def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
             columns: Columns, first: int, most: int, regions: Regions, bin_size: Array, longest: int, yields: Array,
             rides: IndexArray, actions: Array, rng: np.random.Generator) -> tuple[int, bool]:
-    """Ride, one ride after the other, for `most` steps.
+    """Ride, one ride after the other, for `most` steps, or until there is no space to open a bin.
 
     Args:
         parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
@@ -191,7 +193,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
         bounds: Lower and upper bounds of the controls [2, A].
         columns, first: The tree's arrays, with space for `most` more nodes, and the number of nodes so far.
         most: How many steps.
-        regions, bin_size: The regions, with space for `most` more nodes, and the edges of the bins [F].
+        regions, bin_size: The regions, with space for `most` more nodes and a bin, and the edges of the bins [F].
         longest: The most steps of a ride.
         yields: Bins opened and steps used so far, and the weight [3, answers, 3], by scale, kind and patience.
         rides, actions: The first row of each is the ride in progress, and its control.
@@ -207,6 +209,8 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
     bounds, bin_size, feature_dims = uncounted(bounds), uncounted(bin_size), uncounted(feature_dims)
     rows, cells, places, order, runs, tails, totals, pool, free, used, cell = regions
     for child in range(first, first + most):
+        if totals[REGIONS] + len(order) > len(rows):
+            return child - first, False
         if rides[0, ACTIVE] == 0:
             _begin(rows, order, runs, tails, totals, pool, yields, bounds, rides, actions, 0, rng)
         node = rides[0, NODE]

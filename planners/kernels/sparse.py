@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.planners.kernels.bin_queue import BinQueue
 from pbcs_ompl.planners.kernels.cells import find_cell
-from pbcs_ompl.planners.kernels.runs import LENGTH, MEMBER, START
 
 
 @njit()
@@ -20,11 +19,11 @@ def draw_sparse(queue: BinQueue, reach: int, rng: np.random.Generator, nodes: ND
     cell = np.empty(queue.cells.shape[1], np.int64)
     for row in range(len(nodes)):
         while True:
-            number = int(rng.random() * queue.head[0, LENGTH])
-            inside = queue.heads[number, LENGTH]
+            number = int(rng.random() * queue.head[0].length)
+            inside = queue.heads[number].length
             if rng.random() * _around(queue, number, reach, cell) < inside:
                 break
-        nodes[row] = queue.pool[queue.heads[number, START] + int(rng.random() * inside), MEMBER]
+        nodes[row] = queue.pool[queue.heads[number].start + int(rng.random() * inside)]
 
 
 @njit()
@@ -40,5 +39,5 @@ def _around(queue: BinQueue, number: int, reach: int, cell: NDArray[np.int64]) -
             rest //= width
         found = queue.table[find_cell(queue.cells, queue.table, cell)] - 1
         if found >= 0:
-            total += queue.heads[found, LENGTH]
+            total += queue.heads[found].length
     return total

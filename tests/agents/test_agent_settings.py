@@ -17,8 +17,8 @@ from pbcs_ompl.core.errors import InvalidOption, UnknownName, UnsupportedSpace
 def test_presets_hold_what_the_sources_say() -> None:
     assert {"fast", "thesis", "thesis-chapter-4"} <= set(preset_names())
     thesis, chapter_4 = DDPGSettings.from_preset("thesis"), DDPGSettings.from_preset("thesis-chapter-4")
-    assert thesis == DDPGSettings((400, 300), False, 1e-3, 1e-3, 100, 0.99, 0.995, 1_000_000)
-    assert chapter_4 == DDPGSettings((64, 64), True, 1e-4, 1e-3, 64, 0.99, 0.99, 1_000_000)
+    assert thesis == DDPGSettings((400, 300), False, 1e-3, 1e-3, 100, 0.99, 0.995, 1_000_000, "glorot", "plain")
+    assert chapter_4 == DDPGSettings((64, 64), True, 1e-4, 1e-3, 64, 0.99, 0.99, 1_000_000, "baselines", "baselines")
     assert DDPGSettings.from_preset("fast") == DDPGSettings()
     assert DDPGSettings.from_preset("thesis", discount=0.9).discount == 0.9
 
@@ -68,7 +68,7 @@ def test_errors_name_the_closest_name() -> None:
 @pytest.mark.parametrize("wrong", [
     {"discount": 1.0}, {"discount": -0.1}, {"discount": float("nan")}, {"polyak": 1.5}, {"batch_size": 0},
     {"hidden": ()}, {"hidden": (64, 0)}, {"replay_capacity": 0}, {"actor_learning_rate": 0.0},
-    {"critic_learning_rate": -1.0},
+    {"critic_learning_rate": -1.0}, {"initialisation": "xavier"}, {"inputs": "normalised"},
 ])
 def test_settings_out_of_range_are_named(wrong: dict) -> None:
     with pytest.raises(InvalidOption, match=next(iter(wrong))):

@@ -18,18 +18,23 @@ def generators(*seeds: int) -> list[np.random.Generator]:
 def reference(network: MLP, flat: torch.Tensor, inputs: torch.Tensor) -> torch.Tensor:
     """The same network in the simplest form, recorded for autograd."""
     layers = network.split(flat)
-    for weight, bias, norm in layers[:-1]:
+    inputs, late = inputs.split([network.sizes[0] - network.late_inputs, network.late_inputs], dim=2)
+    for index, (weight, bias, norm) in enumerate(layers[:-1]):
+        inputs = torch.cat((inputs, late), dim=2) if index == 1 else inputs
         inputs = inputs @ weight + bias
         if norm is not None:
             inputs = torch.nn.functional.layer_norm(inputs, inputs.shape[-1:]) * norm.gain + norm.shift
         inputs = torch.relu(inputs)
+    inputs = torch.cat((inputs, late), dim=2) if len(layers) == 2 else inputs
     return inputs @ layers[-1].weight + layers[-1].bias
 
 
+@pytest.mark.parametrize("late_inputs", [0, 1])
 @pytest.mark.parametrize("layer_norm", [False, True])
 @pytest.mark.parametrize("sizes", [(3, 16, 8, 2), (5, 7, 1), (2, 20, 20, 20, 3)])
-def test_outputs_and_gradients_equal_those_of_plain_torch(sizes: tuple[int, ...], layer_norm: bool) -> None:
-    network = MLP(sizes, layer_norm)
+def test_outputs_and_gradients_equal_those_of_plain_torch(sizes: tuple[int, ...], layer_norm: bool,
+                                                          late_inputs: int) -> None:
+    network = MLP(sizes, layer_norm, late_inputs)
     flat = network.initial(generators(1, 2, 3)) + 0.1 * torch.randn(3 * network.num_parameters)
     inputs, grad = torch.randn(3, 11, sizes[0]), torch.randn(3, 11, sizes[-1])
     weights, gradient = Weights(network, flat), Weights(network, torch.zeros_like(flat))

@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,10 @@ from pbcs_ompl.experiments.study import find_study
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 README = PAGES[0].read_text()
+IN_ORDER = [ROOT / "docs" / name for name in ("deploy.md", "export.md")]
+"""Pages whose commands and snippets use what those above them have made."""
+ALONE = [page for page in PAGES if page not in IN_ORDER]
+LIBRARIES = ("minari", "h5py", "onnx", "onnxruntime", "mujoco")
 
 
 def blocks(text, language):
@@ -27,8 +32,8 @@ def commands(text):
 
 
 SNIPPETS = [pytest.param(code, id=f"{page.name}-{number}")
-            for page in PAGES for number, code in enumerate(blocks(page.read_text(), "python"))]
-ELSEWHERE = [line for page in PAGES[1:] for line in commands(page.read_text())]
+            for page in ALONE for number, code in enumerate(blocks(page.read_text(), "python"))]
+ELSEWHERE = [line for page in ALONE[1:] for line in commands(page.read_text())]
 STUDY = re.compile(r"pbcs study (\S+)(?!.*--emit)")
 """A line that makes the runs of a study, and so takes long."""
 
@@ -67,6 +72,23 @@ def test_command_lines_of_the_docs_work(line, tmp_path, monkeypatch):
         assert main(shlex.split(line)[1:]) == 0
     else:
         assert find_study(parse(build_parser(), shlex.split(line)[1:]).id).id == study_of(line)
+
+
+@pytest.mark.parametrize("page", IN_ORDER, ids=lambda page: page.name)
+def test_pages_work_from_top_to_bottom(page, tmp_path, monkeypatch, capsys):
+    """What needs a library that is not installed here is refused, and named, or left out."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    missing = [name for name in LIBRARIES if find_spec(name) is None]
+    text = re.sub(r'\{"size": \d+, "maze_seed": \d+\}', '{"size": 2}', page.read_text())
+    for language, block in re.findall(r"^```(\w*)\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL):
+        if language == "python" and not any(f"import {name}" in block for name in missing):
+            exec(compile(block, page.name, "exec"), {"__name__": "__main__"})
+        for line in commands(f"```\n{block}```") if language == "" else ():
+            status = main(shlex.split(line)[1:])
+            error = capsys.readouterr().err
+            assert status == 0 or (status == 3 and any(name in error for name in missing)), f"{line}: {error}"
 
 
 def test_make_targets_exist():

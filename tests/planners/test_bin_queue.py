@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert, select, tied_bins
-from pbcs_ompl.planners.kernels.runs import COUNT, LENGTH, MEMBER, START
 
 
 class Algorithm5:
@@ -47,15 +46,19 @@ class Algorithm5:
         return chosen
 
 
+def members_of(queue, members, head):
+    """Return {member: count} of one least-count queue."""
+    start, end, run, counts = head["start"], head["length"], head, {}
+    while end > 0:
+        counts.update(dict.fromkeys(members[start + run["first"]:start + end].tolist(), int(run["count"])))
+        end, run = run["first"], queue.runs[run["higher"]]
+    return counts
+
+
 def counts_of(queue):
     """Return {cell: (bin count, {node: count})}."""
-    bins = {}
-    for member, count, _ in queue.order[:queue.num_bins].tolist():
-        start, length = queue.heads[member, START], queue.heads[member, LENGTH]
-        rows = queue.pool[start:start + length]
-        inside = dict(zip(rows[:, MEMBER].tolist(), rows[:, COUNT].tolist(), strict=True))
-        bins[tuple(queue.cells[member])] = (count, inside)
-    return bins
+    return {tuple(queue.cells[number]): (count, members_of(queue, queue.pool, queue.heads[number]))
+            for number, count in members_of(queue, queue.order, queue.head[0]).items()}
 
 
 def grown(rng, operations, spread, features=2):
@@ -66,7 +69,7 @@ def grown(rng, operations, spread, features=2):
     for new in range(operations + 1):
         if new > 0:
             uniforms = rng.random((1, 2))
-            select(queue, uniforms, nodes)
+            queue = select(queue, uniforms, nodes)
             yield queue, plain, int(nodes[0]), plain.select(*uniforms[0])
             points[new] = points[nodes[0]] + rng.normal(0.0, spread, features)
         queue = insert(queue, points[new:new + 1], np.zeros(1, bool), size, new)
@@ -89,9 +92,9 @@ def test_a_batch_of_selections_is_the_selections_one_by_one():
     points = rng.uniform(-3, 3, (500, 2))
     one, many = (insert(empty_queue(2), points, np.zeros(500, bool), np.ones(2), 0) for _ in range(2))
     uniforms, together, alone = rng.random((300, 2)), np.empty(300, np.int64), np.empty(1, np.int64)
-    select(many, uniforms, together)
+    many = select(many, uniforms, together)
     for row in range(300):
-        select(one, uniforms[row:row + 1], alone)
+        one = select(one, uniforms[row:row + 1], alone)
         assert alone[0] == together[row]
 
 
@@ -107,7 +110,7 @@ def test_counters_by_brute_force(seed, operations, spread):
         least = min(count for count, _ in bins.values())
         assert all(count == sum(inside.values()) for count, inside in bins.values())
         assert tied_bins(queue) == sum(count == least for count, _ in bins.values())
-        select(queue, rng.random((1, 2)), nodes)
+        queue = select(queue, rng.random((1, 2)), nodes)
         chosen = int(nodes[0])
         count, inside = bins[tuple(np.floor(points[chosen] / size).astype(int).tolist())]
         assert count == least
@@ -147,6 +150,6 @@ def test_large_trees_keep_every_node_once():
     points = rng.normal(0, 30, (300_000, 2))
     queue = insert(empty_queue(2), points, np.zeros(len(points), bool), np.ones(2), 0)
     heads = queue.heads[:queue.num_bins]
-    members = [queue.pool[head[START]:head[START] + head[LENGTH], MEMBER] for head in heads]
+    members = [queue.pool[head["start"]:head["start"] + head["length"]] for head in heads]
     assert np.array_equal(np.sort(np.concatenate(members)), np.arange(len(points)))
     assert queue.num_bins == len(np.unique(np.floor(points), axis=0))

@@ -133,4 +133,4 @@ def test_nan_in_the_compiled_step_names_the_transition(solve, compiled_square):
 
 def test_memory_of_a_node(solve, compiled_square):
     planner, _, _, _ = solve(lambda si: Ex.build(si, bin_size=0.1), compiled_square(goal=9.0), 300_000)
-    assert (planner.tree.nbytes + planner.strategy.nbytes) / len(planner.tree) < 110
+    assert (planner.tree.nbytes + planner.strategy.nbytes) / len(planner.tree) < 65

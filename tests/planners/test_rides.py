@@ -11,7 +11,7 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.planners import Rides
-from pbcs_ompl.planners.kernels.ranking import COUNT, END, FIRST, KEY, LENGTH, MISSING, PLACE, REGIONS, RUN, START
+from pbcs_ompl.planners.kernels.ranking import REGIONS
 from pbcs_ompl.planners.kernels.regions import no_regions, open_bin, reserve
 
 EXACT, TIMEOUT = ob.PlannerStatus.EXACT_SOLUTION, ob.PlannerStatus.TIMEOUT
@@ -62,20 +62,20 @@ def check_regions(regions, features):
         around = [(*cell[:axis], cell[axis] + side, *cell[axis + 1:]) for axis in range(features)
                   for side in (-1, 1)]
         missing = sum(other not in cells for other in around)
-        assert rows[number, MISSING] == missing
-        key = rows[number, COUNT] if missing else 4 * (rows[number, COUNT] + 1)
-        run = regions.runs[rows[number, RUN]]
-        assert run[KEY] == key
-        assert run[FIRST] <= rows[number, PLACE] < run[END]
-        assert regions.order[cell[-1], rows[number, PLACE]] == number
+        assert rows[number]["missing"] == missing
+        key = rows[number]["count"] if missing else 4 * (rows[number]["count"] + 1)
+        run = regions.runs[rows[number]["run"]]
+        assert run["key"] == key
+        assert run["first"] <= rows[number]["place"] < run["end"]
+        assert regions.order[cell[-1], rows[number]["place"]] == number
     for scale in range(len(regions.order)):
         members = [number for cell, number in cells.items() if cell[-1] == scale]
         order = regions.order[scale, :len(members)].tolist()
         assert sorted(order) == sorted(members)
-        keys = [regions.runs[rows[number, RUN], KEY] for number in order]
+        keys = [regions.runs[rows[number]["run"]]["key"] for number in order]
         assert keys == sorted(keys, reverse=True)
-        inner = sum(rows[number, COUNT] for number in members)
-        assert inner == sum(rows[number, COUNT] for cell, number in cells.items() if cell[-1] == 0)
+        inner = sum(rows[number]["count"] for number in members)
+        assert inner == sum(rows[number]["count"] for cell, number in cells.items() if cell[-1] == 0)
     return cells
 
 
@@ -105,7 +105,7 @@ def test_regions_by_brute_force(seed, width, features):
     regions = rides.regions
     cells = check_regions(regions, features)
     kept = {int(node) for cell, number in cells.items() if cell[-1] == 0
-            for node in regions.pool[regions.rows[number, START]:, 0][:regions.rows[number, LENGTH]]}
+            for node in regions.pool[regions.rows[number]["start"]:][:regions.rows[number]["length"]]}
     assert kept == set(np.flatnonzero(~tree.terminal).tolist())
 
 
@@ -113,7 +113,7 @@ def test_opening_the_same_world_in_any_order_gives_the_same_regions():
     rng, points = np.random.default_rng(0), np.array([(x, y) for x in range(-9, 9) for y in range(-9, 9)])
     counts = set()
     for _ in range(3):
-        regions = reserve(no_regions(2, 4), len(points))
+        regions = reserve(no_regions(2, 4), len(points), len(points))
         for point in rng.permutation(points):
             open_bin(regions, np.array([*point, 0]))
         check_regions(regions, 2)

@@ -53,6 +53,16 @@ class Dice(Slider):
         return super().step(action + np.random.default_rng().normal(size=1))
 
 
+class Built(Slider):
+    """Each instance is another one."""
+
+    def __init__(self) -> None:
+        self.strength = float(np.random.default_rng().uniform(0.5, 1.0))
+
+    def step(self, action: Any) -> Any:
+        return super().step(self.strength * action)
+
+
 @pytest.mark.parametrize("env_id", ["Pendulum-v1", "MountainCarContinuous-v0"])
 def test_classic_control(env_id: str) -> None:
     model: Any = make(env_id)
@@ -119,6 +129,23 @@ def test_actions_are_replayed_where_copies_are_not_faithful(kind: type[Slider]) 
         states.append(model.transition(states[-1][None], control[None]).states[0])
     again = model.transition(np.array(states[:-1]), controls)
     np.testing.assert_array_equal(again.states, states[1:])
+
+
+@pytest.mark.parametrize("kind", [Slider, Uncopyable])
+def test_visited_states_are_within_the_bounds_whatever_the_seed(kind: type[Slider]) -> None:
+    model = adapt(kind())
+    start = model.initial_state(2**32 - 1)[None]
+    after = model.transition(start, np.full((1, 1), 0.5)).states
+    assert model.is_valid(np.concatenate([start, after])).all()
+
+
+def test_instances_that_differ_are_refused_for_what_they_are() -> None:
+    gymnasium.register("tests/Built-v0", Built)
+    try:
+        with pytest.raises(NotResettable, match=r"constructor drew random numbers.*at step 1"):
+            make("tests/Built-v0")
+    finally:
+        del gymnasium.registry["tests/Built-v0"]
 
 
 def test_random_steps_are_refused() -> None:

@@ -40,6 +40,15 @@ class RingState(Ring):
         self.place = np.array(state)
 
 
+class Mover(Ring):
+    """Its reset changes the options that it is given, those within them too."""
+
+    def reset(self, *, seed=None, options=None):
+        start = options.pop("start")
+        start[0] -= 0.1
+        return super().reset(seed=seed, options={"start": start})
+
+
 class Wind(RingState):
     """Wind beyond x > 0.6 from NumPy's global generator, which no state holds."""
 
@@ -180,3 +189,16 @@ def test_the_judge_agrees_with_the_model():
         states = outcome.states
     judged = [Judge.of(model).execute(row, 0).success for row in controls]
     assert judged == success.tolist()
+
+
+def test_a_reset_may_change_its_options():
+    options = {"start": [0.7, 0.2]}
+    found = plan(Mover(), "Ex", seed=0, reset_options=options, max_transitions=5000)
+    assert found.solved
+    assert options == {"start": [0.7, 0.2]}
+    env = Mover()
+    observation, _ = env.reset(options={"start": [0.7, 0.2]})
+    assert found.trajectory.states[0][:2].tolist() == observation.tolist()
+    for action in found.trajectory.actions:
+        *_, info = env.step(action)
+    assert info["is_success"]

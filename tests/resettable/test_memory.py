@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 pytest.importorskip("mujoco")
 
 from pbcs_ompl.core.errors import InvalidState, NotResettable
-from pbcs_ompl.resettable import adapt
+from pbcs_ompl.resettable import adapt, check_resettable
+from pbcs_ompl.resettable.adapters.restorable import GUARD_EVERY
 from pbcs_ompl.resettable.branching import LONG, first_difference
 from pbcs_ompl.resettable.memory.code import names_of
-from pbcs_ompl.resettable.memory.memory import GUARD_EVERY
 from pbcs_ompl.resettable.memory.plain_values import enum_name, from_text, pack, same, size_for, to_text, unpack
 from tests.resettable.toys import Cart, Line, walk
 
@@ -213,6 +213,41 @@ def with_state(kind: type[Cart]) -> type[Cart]:
     return type("WithState", (kind,), {
         "get_env_state": lambda self: self._get_obs(), "set_env_state": set_env_state,
         "state_low": np.full(2, -9.0), "state_high": np.full(2, 9.0)})
+
+
+@pytest.mark.parametrize("sets_back", [True, False])
+def test_a_generator_that_set_env_state_sets_back_is_state(sets_back: bool) -> None:
+    class Noisy(Line):
+        """Noise of a generator; how many numbers were drawn is a part of the state."""
+
+        state_low, state_high = np.array([-9.0, 0.0]), np.array([9.0, 1e6])
+        capabilities = frozenset({"visited", "exact"})  # not every number is a number of draws
+
+        def begin(self) -> None:
+            self.own, self.draws = np.random.default_rng(7), 0
+
+        def push(self, action: float) -> float:
+            self.draws += 1
+            return 0.1 * action + 0.01 * float(self.own.normal())
+
+        def get_env_state(self) -> Any:
+            return np.array([self.x, self.draws])
+
+        def set_env_state(self, state: Any) -> None:
+            self.x, self.draws = float(state[0]), int(state[1])
+            if sets_back:
+                self.own = np.random.default_rng(7)
+                self.own.normal(size=self.draws)
+
+        def observe(self, states: Any) -> Any:
+            return np.asarray(states)[:, :1]
+
+    if sets_back:
+        report = check_resettable(Noisy())
+        assert report.ok, str(report)
+    else:
+        with pytest.raises(NotResettable, match="steps draw random numbers from own"):
+            adapt(Noisy())
 
 
 def test_random_numbers_in_reset_are_welcome() -> None:

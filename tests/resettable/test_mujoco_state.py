@@ -9,8 +9,8 @@ pytest.importorskip("mujoco")
 
 from pbcs_ompl.core.errors import NotResettable
 from pbcs_ompl.resettable import adapt, check_resettable
+from pbcs_ompl.resettable.adapters.restorable import GUARD_EVERY
 from pbcs_ompl.resettable.branching import LONG, first_difference
-from pbcs_ompl.resettable.memory.memory import GUARD_EVERY
 from tests.resettable.toys import Cart, walk
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.errors import CallbackFailed, InvalidOption
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.rules import Outcome, feature_rule, goal_rule, reported_success, rule_text
 
@@ -105,6 +105,19 @@ def test_what_the_environment_reports() -> None:
     assert not reported_success(outcome(success=False, terminated=True))
     assert reported_success(outcome(reward=1.0, terminated=True))
     assert not reported_success(outcome(reward=-1.0, terminated=True))
+
+
+@pytest.mark.parametrize(("value", "success"), [
+    (np.bool_(True), True), (np.array([True]), True), (1.0, True), (np.float32(0.0), False), (None, False),
+    (float("nan"), False), (np.array([np.nan]), False)])
+def test_success_in_other_types(value: Any, success: bool) -> None:
+    assert reported_success(Outcome(None, None, 1.0, False, {"is_success": value})) is success
+
+
+@pytest.mark.parametrize("value", ["False", [], [True, False], {}])
+def test_what_is_no_success_is_refused(value: Any) -> None:
+    with pytest.raises(CallbackFailed, match="expected True or False"):
+        reported_success(Outcome(None, None, 1.0, False, {"success": value}))
 
 
 def test_functions_are_rules() -> None:

@@ -93,7 +93,7 @@ def test_a_training_that_was_stopped_or_killed_resumes_bit_for_bit(tmp_path, num
 
 
 @pytest.mark.parametrize(("method", "budget"), [("pbcs", 10_000_000), ("pb", 20_000), ("backplay", 20_000),
-                                                ("plain", 30_000), ("bootstrapped", 30_000),
+                                                ("plain", 30_000), ("bootstrapped", 60_000),
                                                 ("offline", 30_000)])
 def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, method, budget):
     options = {"env_kwargs": MAZE, "seed": 1, "method": method, "max_transitions": budget}

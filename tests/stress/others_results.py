@@ -32,11 +32,17 @@ def analyse(records, figures):
     return [Claim("some are heads", True, {"heads": heads}, "a coin"), Claim("coins dream", None)]
 ''',
 }
+POINT = {"lines_per_world": 5, "longest": 3.0, "clearance": 0.1, "near": 0.1, "middle": 0.2, "far": 0.4, "window": 0.3,
+         "goal_radius": 0.15, "patience": 15, "max_steps": 100, "advance": 0.5, "test_transitions": 2000, "effort": 0.0}
+"""Settings of a follower for the point of the maze, which moves 0.1 in a step."""
+ROBOT = f"""--method follow --lines random --settings '{json.dumps(POINT)}' --agent-settings '{{"hidden": [32, 32]}}'"""
 COMPARE = f"compare --planners Ex SST {MAZE} --seeds 2 --max-transitions 2000"
 MADE = {
     "plan": f"plan {MAZE}",
     "training": f"train {MAZE} --seed 3",
-    "stopped": f"train {MAZE} --seed 3 --max-transitions 9000",
+    "stopped": f"train {MAZE} --seed 3 --max-transitions 19000",
+    "follow": f"train {MAZE} --method follow --seed 3",
+    "robot": f"train {MAZE} {ROBOT} --max-transitions 19000",
     "evaluation": "eval runs/training --episodes 7 --epsilon 0.1",
     "comparison": COMPARE,
     "study": "study coin-toss",
@@ -45,6 +51,9 @@ USES = {
     "plan": ["report runs/plan", f"train {MAZE} --path runs/plan --max-transitions 1 --out again"],
     "training": ["report runs/training", "eval runs/training --episodes 3", "train --resume runs/training"],
     "stopped": ["report runs/stopped", "train --resume runs/stopped"],
+    "follow": ["report runs/follow", "eval runs/follow --episodes 3", "train --resume runs/follow"],
+    "robot": ["report runs/robot", f"eval runs/robot {MAZE} --episodes 3",
+              "eval runs/robot --path runs/plan --episodes 3", "train --resume runs/robot"],
     "evaluation": ["report runs/evaluation"],
     "comparison": ["report runs/comparison", f"{COMPARE} --out runs/comparison"],
     "study": ["report runs/study", "study coin-toss --out runs/study"],

@@ -18,7 +18,7 @@ import psutil
 import pytest
 
 SEED = 20261127
-KILLS = {"plan": 15, "train": 21, "compare": 12, "study": 12}
+KILLS = {"plan": 15, "train": 21, "follow": 12, "compare": 12, "study": 12}
 SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 LEFTOVER = re.compile(r"\..+\.[0-9a-f]{8}(-journal)?|\.lock.*")
 MEASURED = re.compile(r"seconds.*|memory.*|out|database|progress|cpu_seconds")
@@ -44,6 +44,7 @@ MAZE = ["--env", "pbcs/Maze-v0", "--env-kwargs"]
 COMMANDS = {
     "plan": ["plan", *MAZE, '{"size": 12, "maze_seed": 1}', "--planner", "RandomWalk", "--max-transitions", "6000"],
     "train": ["train", *MAZE, '{"size": 3, "maze_seed": 1}', "--seed", "1"],
+    "follow": ["train", *MAZE, '{"size": 3, "maze_seed": 1}', "--method", "follow", "--seed", "1"],
     "compare": ["compare", "--planners", "Ex", "RRTNH", *MAZE, '{"size": 3}', "--seeds", "4", "--jobs", "2"],
     "study": ["study", "walks", "--jobs", "2"],
 }
@@ -56,7 +57,7 @@ def start(words, folder):
 
 def continued(verb, out):
     """Return the words that go on with what lies in a folder."""
-    if verb == "train" and (out / "config.toml").exists():
+    if verb in ("train", "follow") and (out / "config.toml").exists():
         return ["train", "--resume", out.name]
     return [*COMMANDS[verb], "--out", out.name]
 
@@ -134,7 +135,7 @@ def killed_folders(verb, folder, moments):
 
 
 def finish_or_picture(verb, out):
-    picture = {"plan": "tree.png", "train": "chain.png"}.get(verb)
+    picture = {"plan": "tree.png", "train": "chain.png", "follow": "chain.png"}.get(verb)
     if not (out / "result.json").exists() or (picture and not (out / picture).exists()) or verb in ("compare", "study"):
         finish(verb, out)
 

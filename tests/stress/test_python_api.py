@@ -11,13 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from stress.forked import NAMED, call, named
+from stress.others_results import POINT
 
 import pbcs_ompl
 from pbcs_ompl.core.errors import CallbackFailed
+from pbcs_ompl.skills import RobotFollower, evaluate_follower, load_chain, resume_follower, train_follower
+from pbcs_ompl.skills.path_following.chain import FollowChain
 
 CALLS, SEED = 400, 20261127
 MAZE, SMALL = "pbcs/Maze-v0", {"size": 2}
-CHAIN = Path("chain")
+CHAIN, FOLLOWER = Path("chain"), Path("follower")
 
 
 class Unspeakable:
@@ -46,6 +49,8 @@ VALUES = {
 PLAN = {"env": MAZE, "env_kwargs": SMALL, "max_transitions": 500}
 TRAIN = {"env": MAZE, "env_kwargs": SMALL, "max_transitions": 600}
 COMPARE = {"planners": ["Ex"], "env": MAZE, "env_kwargs": SMALL, "seeds": 1, "max_transitions": 300}
+FOLLOW = {"env": MAZE, "env_kwargs": SMALL, "settings": POINT, "agent_settings": {"hidden": [32, 32]},
+          "max_transitions": 19000}
 OPEN = ("goal", "feature", "start_seed", "reset_options", "max_episode_steps")
 FUNCTIONS = {
     "plan": (pbcs_ompl.plan, PLAN, ("planner", "planner_kwargs", *OPEN, "seed", "max_seconds", "out", "coverage",
@@ -66,6 +71,14 @@ FUNCTIONS = {
     "EnvSpec": (pbcs_ompl.EnvSpec, {"id": MAZE, "kwargs": SMALL}, OPEN),
     "Trajectory.load": (pbcs_ompl.Trajectory.load, {"path": "nowhere.npz"}, ()),
     "SkillChain.load": (pbcs_ompl.SkillChain.load, {"folder": "nowhere"}, ()),
+    "load_chain": (load_chain, {"folder": "nowhere"}, ("trust",)),
+    "FollowChain.load": (FollowChain.load, {"folder": "nowhere"}, ("trust",)),
+    "RobotFollower.load": (RobotFollower.load, {"folder": "nowhere"}, ("trust",)),
+    "RobotFollower.shipped": (RobotFollower.shipped, {"name": "ant"}, ()),
+    "train_follower": (train_follower, FOLLOW, ("worlds", "settings", "agent_settings", "seed", "out", "on_progress")),
+    "resume_follower": (resume_follower, {"folder": "nowhere"}, ("max_transitions", "trust", "on_progress")),
+    "evaluate_follower": (evaluate_follower, {"follower": FOLLOWER, "env": MAZE, "env_kwargs": SMALL, "episodes": 3},
+                          ("trajectory", "epsilon", "seed")),
 }
 CASES = [(name, slot, value) for name, (_, base, more) in FUNCTIONS.items() for slot in (*base, *more)
          for value in VALUES]
@@ -78,14 +91,20 @@ def chain():
     return trained.chain
 
 
+@pytest.fixture(scope="module")
+def follower():
+    return train_follower(**FOLLOW).follower
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_odd_arguments_meet_named_errors(chain, tmp_path):
+def test_odd_arguments_meet_named_errors(chain, follower, tmp_path):
     found, raw = Counter(), []
     for name, slot, value in random.Random(SEED).sample(CASES, min(CALLS, len(CASES))):
         function, base, _ = FUNCTIONS[name]
         arguments = base | {slot: VALUES[value]}
-        arguments = {key: chain if one is CHAIN else one for key, one in arguments.items()}
+        arguments = {key: chain if one is CHAIN else follower if one is FOLLOWER else one
+                     for key, one in arguments.items()}
         ended = call(named(lambda f=function, a=arguments: f(**a)), seconds=60, folder=tmp_path)
         found[ended.status] += 1
         if ended.status != NAMED:

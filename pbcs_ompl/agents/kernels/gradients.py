@@ -30,8 +30,8 @@ def forward(weights: Weights, inputs: Tensor) -> tuple[Tensor, Activations]:
     """Return the outputs [S, B, out] for inputs [S, B, in], and what `backward` needs."""
     activations = Activations([], [])
     *hidden, last = weights.layers
-    values = inputs
-    for weight, bias, norm in hidden:
+    values, late = weights.network.divide(inputs)
+    for index, (weight, bias, norm) in enumerate(hidden):
         activations.inputs.append(values)
         values = torch.baddbmm(bias, values, weight)
         if norm is not None:
@@ -39,6 +39,8 @@ def forward(weights: Weights, inputs: Tensor) -> tuple[Tensor, Activations]:
             activations.norms.append((normal, deviation))
             values = torch.addcmul(norm.shift, normal, norm.gain)
         values = values.relu_()
+        if index == 0 and late is not None:
+            values = torch.cat((values, late), dim=2)
     activations.inputs.append(values)
     return torch.baddbmm(last.bias, values, last.weight), activations
 
@@ -52,25 +54,32 @@ def backward(weights: Weights, activations: Activations, grad: Tensor, gradient:
         grad: Derivative of the loss by the outputs [S, B, out].
         gradient: What is filled.
     """
-    _through_layers(weights.layers, activations, grad, gradient.layers)
+    _through_layers(weights, activations, grad, gradient.layers)
 
 
 def input_gradient(weights: Weights, activations: Activations, grad: Tensor) -> Tensor:
     """Return the derivative of a loss by the inputs [S, B, in]; see `backward`."""
+    grad, late = _through_layers(weights, activations, grad, None)
+    grad = torch.bmm(grad, weights.layers[0].weight.transpose(1, 2))
+    return grad if late is None else torch.cat((grad, late), dim=2)
+
+
+def _through_layers(weights: Weights, activations: Activations, grad: Tensor,
+                    gradients: list[Layer] | None) -> tuple[Tensor, Tensor | None]:
+    """Return the derivatives by the first layer's sums [S, B, hidden], and by the inputs that skip it, if any.
+
+    Fill `gradients` on the way.
+    """
     layers = weights.layers
-    grad = _through_layers(layers, activations, grad, None)
-    return torch.bmm(grad, layers[0].weight.transpose(1, 2))
-
-
-def _through_layers(layers: list[Layer], activations: Activations, grad: Tensor,
-                    gradients: list[Layer] | None) -> Tensor:
-    """Return the derivative by the first layer's sums [S, B, hidden]; fill `gradients` on the way."""
-    last = len(layers) - 1
+    last, late = len(layers) - 1, None
     for index in range(last, -1, -1):
         into = None if gradients is None else gradients[index]
         norm = layers[index].norm
         if index < last:
-            grad = torch.ops.aten.threshold_backward(grad, activations.inputs[index + 1], 0.0)
+            values = activations.inputs[index + 1]
+            if index == 0:
+                (grad, late), (values, _) = weights.network.divide(grad), weights.network.divide(values)
+            grad = torch.ops.aten.threshold_backward(grad, values, 0.0)
         if norm is not None:
             learnt = None if into is None else into.norm
             grad = _norm_backward(norm.gain, activations.norms[index], grad, learnt)
@@ -79,7 +88,7 @@ def _through_layers(layers: list[Layer], activations: Activations, grad: Tensor,
             torch.sum(grad, 1, keepdim=True, out=into.bias)
         if index > 0:
             grad = torch.bmm(grad, layers[index].weight.transpose(1, 2))
-    return grad
+    return grad, late
 
 
 def _norm_backward(gain: Tensor, norm: tuple[Tensor, Tensor], grad: Tensor, into: Norm | None) -> Tensor:

@@ -1,5 +1,6 @@
-"""The adapter for every environment that shows a MuJoCo `model` and `data`: Gymnasium's, gymnasium-robotics', yours."""
+"""The adapter for every environment in which MuJoCo runs: Gymnasium's, gymnasium-robotics', dm_control's, yours."""
 
+import math
 import os
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -8,25 +9,21 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from pbcs_ompl.core.errors import InvalidState, MissingDependency, NotResettable
+from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel, Step
 from pbcs_ompl.resettable.adapters.mujoco_probe import find_read_first
 from pbcs_ompl.resettable.adapters.mujoco_state import PHYSICS, ModelParts, Physics
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes, plain_copies
-from pbcs_ompl.resettable.memory.memory import GUARD_EVERY, Memory
-from pbcs_ompl.resettable.rules import FeatureRule, Outcome, feature_rule
+from pbcs_ompl.resettable.memory.memory import Memory
+from pbcs_ompl.resettable.rules import FeatureRule, feature_rule
+from pbcs_ompl.resettable.simulation import Simulation, simulation_of
 from pbcs_ompl.resettable.supported import task_env
 from pbcs_ompl.resettable.task_env import bare
 
 BROKEN = "4.0.0"
 """The version that computes wrong accelerations where the constraint Jacobian is sparse."""
-
-
-def is_mujoco_env(env: Any) -> bool:
-    """Return whether `env` has a MuJoCo model and its data."""
-    return type(getattr(env, "model", None)).__name__ == "MjModel" and hasattr(env, "data")
 
 
 class MujocoEnv(RestorableEnv):
@@ -39,49 +36,49 @@ class MujocoEnv(RestorableEnv):
         import mujoco
 
         self._mujoco: Any = mujoco  # its functions have no types
-        if mujoco.__version__ == BROKEN and self._mujoco.mj_isSparse(inner.model):
+        self.inner = inner
+        self._simulation = self._simulation_in(inner)
+        self._simulation.check_observed()
+        if mujoco.__version__ == BROKEN and self._mujoco.mj_isSparse(self._simulation.model):
             warnings.warn(f"mujoco {BROKEN} computes wrong accelerations for this model, whose constraint Jacobian is "
                           f"sparse; install mujoco 4.0.1 or newer, or 3.x", stacklevel=2)
-        self.inner, before = inner, plain_copies(inner)
-        self._physics, self._parts = Physics(mujoco, inner.model), ModelParts(inner.model)
-        self._first_physics = self._physics.save(inner.model, inner.data)
+        before, model = plain_copies(inner), self._simulation.model
+        self._physics, self._parts = Physics(mujoco, model), ModelParts(model)
+        self._first_physics = self._physics.save(model, self._simulation.data)
         inner.reset(seed=SEEDS[0])
-        self._parts.look(inner.model, after_reset=True)
+        self._parts.look(model, after_reset=True)
         self._has_goal = isinstance(given := getattr(inner, "goal", None), np.ndarray) and given.ndim == 1
         changes = Changes(inner)
         for event in episodes(inner):
             changes.add(event)
-            self._parts.look(inner.model, after_reset=event == "reset")
-        self._memory = Memory(inner, changes, before, known=(inner.data,))
-        self._read_first = find_read_first(inner, lambda: _observed(inner), self._physics, self._parts, self._memory)
-        self._saves = 0
+            self._parts.look(model, after_reset=event == "reset")
+        self._memory = Memory(inner, changes, before, known=(self._simulation.data,))
+        self._read_first = find_read_first(self._simulation, self._physics, self._parts, self._memory)
         self.goal_radius = float(getattr(inner, "distance_threshold", MAZE_GOAL_RADIUS))
         super().__init__(inner, goal, feature)
         self.walls = wall_rectangles(inner.maze) if has_map(inner) else np.empty((0, 4))
 
     def default_feature(self) -> FeatureRule:
         """Return the achieved goal where there is one, else the first two positions."""
-        if isinstance(bare(self.inner).observation_space, gymnasium.spaces.Dict):
+        space = bare(self.inner).observation_space
+        if isinstance(space, gymnasium.spaces.Dict) and "achieved_goal" in space.spaces:
             return feature_rule("achieved_goal")
-        return feature_rule("qpos[0:2]" if self.inner.model.nq > 1 else "qpos[0]")
+        return feature_rule("qpos[0:2]" if self._simulation.model.nq > 1 else "qpos[0]")
 
     def attach(self) -> None:
-        """Let the memory refer to `inner`."""
-        self._memory = self._memory.of(self.inner)
+        """Let what is saved be that of `inner`."""
+        self._simulation, self._memory = self._simulation_in(self.inner), self._memory.of(self.inner)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         """Reset the environment as if nothing had run in it before."""
         self._memory.clear()
-        self._parts.clear(self.inner.model)
-        self._physics.load(self.inner.model, self.inner.data, self._first_physics)
+        self._parts.clear(self._simulation.model)
+        self._physics.load(self._simulation.model, self._simulation.data, self._first_physics)
         return super().reset(seed=seed, options=options)
 
     def save(self) -> Array:
         """Return physics, what is read before it is written, what changes in the model, and attributes."""
-        self._saves += 1
-        if self._saves % GUARD_EVERY == 0:
-            self.check_constants()
-        model, data = self.inner.model, self.inner.data
+        model, data = self._simulation.model, self._simulation.data
         return np.concatenate([self._physics.save(model, data), self._read_first.save(data), self._parts.save(model),
                                self._memory.save()])
 
@@ -91,45 +88,46 @@ class MujocoEnv(RestorableEnv):
         if len(saved) != sum(sizes) or not np.isfinite(saved).all():
             raise InvalidState(f"expected {sum(sizes)} finite numbers for {type(self.inner).__name__}")
         a, b, c = sizes[0], sizes[0] + sizes[1], sizes[0] + sizes[1] + sizes[2]
-        model, data = self.inner.model, self.inner.data
+        model, data = self._simulation.model, self._simulation.data
         self._parts.load(model, saved[b:c])
         self._memory.load(saved[c:])
         self._physics.load(model, data, saved[:a])
-        self._mujoco.mj_kinematics(model, data)
-        self._mujoco.mj_comPos(model, data)
+        self._simulation.complete()
         self._read_first.load(data, saved[a:b])
 
     def observation(self) -> Any:
-        """Return what the environment observes after `mj_forward`, but for the numbers that are saved."""
-        model, data = self.inner.model, self.inner.data
+        """Return what the environment observes when all is computed but the numbers that are saved."""
+        model, data = self._simulation.model, self._simulation.data
         physics, read_first = self._physics.save(model, data), self._read_first.save(data)
-        self._mujoco.mj_forward(model, data)
-        self._mujoco.mj_rnePostConstraint(model, data)
+        self._simulation.forward()
         self._physics.load(model, data, physics)  # the warm start
         self._read_first.load(data, read_first)
-        return _observed(self.inner)
+        return self._simulation.observed()
 
     def check_constants(self) -> None:
         """Refuse an environment of which something else has changed than what is saved."""
-        self._parts.check(self.inner)
+        self._parts.check(self._simulation.model, type(bare(self.inner)).__name__)
         self._memory.check_constants()
 
     def named_state(self, env: Any) -> dict[str, Any]:
         """Return the parts of the state of an environment of this class, by name."""
-        physics = {name: np.array(getattr(env.data, name)) for name in sorted(PHYSICS) if hasattr(env.data, name)}
-        return {"time": env.data.time, **physics, **self._parts.values(env.model),
-                **self._read_first.values(env.data), **self._memory.values(env)}
+        simulation = self._simulation_in(env)
+        data = simulation.data
+        physics = {name: np.array(getattr(data, name)) for name in sorted(PHYSICS) if hasattr(data, name)}
+        return {"time": data.time, **physics, **self._parts.values(simulation.model),
+                **self._read_first.values(data), **self._memory.values(env)}
 
     def render(self) -> Any:
         """Render the environment; a camera that follows the robot is where the restored robot is."""
-        self._mujoco.mj_camlight(self.inner.model, self.inner.data)
+        self._mujoco.mj_camlight(self._simulation.model, self._simulation.data)
         return self.inner.render()
 
-    def reported_goal_distance(self, outcome: Outcome) -> float | None:
+    def reported_goal_distance(self, observation: Any) -> float | None:
         """Return the distance between achieved and desired goal, where they are points."""
-        if not isinstance(outcome.observation, dict) or not self._has_goal:
+        if not isinstance(observation, dict) or not self._has_goal:
             return None
-        return float(np.linalg.norm(outcome.observation["achieved_goal"] - outcome.observation["desired_goal"]))
+        gap = observation["achieved_goal"] - observation["desired_goal"]
+        return math.sqrt(gap.dot(gap))
 
     def feature_box(self) -> tuple[Array, Array] | None:
         """Return the extent of a maze, if that is what is explored."""
@@ -139,11 +137,17 @@ class MujocoEnv(RestorableEnv):
 
     def difference(self, states: Array, others: Array) -> Array:
         """Return MuJoCo's own differences of positions [B, nv], in which turns of a free joint are angles."""
-        model, nq = self.inner.model, self.inner.model.nq
+        model, nq = self._simulation.model, self._simulation.model.nq
         rows = np.empty((len(states), model.nv))
         for row, state, other in zip(rows, states, others, strict=True):  # saved states begin with the time
             self._mujoco.mj_differentiatePos(model, row, 1.0, np.array(other[1:1 + nq]), np.array(state[1:1 + nq]))
         return rows
+
+    @staticmethod
+    def _simulation_in(env: Any) -> Simulation:
+        simulation = simulation_of(env)
+        assert simulation is not None
+        return simulation
 
 
 MAZE_GOAL_RADIUS = 0.45
@@ -180,31 +184,6 @@ class MujocoModel(GetSetStateModel):
         for _ in range(self._threads - 1):
             self._others.append(self.env.again(task_env(self.make_env(), self.spec.reset_options)))
         self._pool = ThreadPoolExecutor(self._threads - 1, thread_name_prefix="mujoco")
-
-
-def _observed(env: Any) -> Any:
-    """Return the observation of an environment; of a maze of gymnasium-robotics, with that of the agent in it."""
-    agent = next((getattr(env, name) for name in ("point_env", "ant_env") if hasattr(env, name)), None)
-    if agent is None:
-        return env._get_obs()
-    seen = agent._get_obs()
-    return env._get_obs(seen[0] if isinstance(seen, tuple) else seen)
-
-
-def check_observes(env: Any) -> None:
-    """Refuse an environment whose observation cannot be asked for.
-
-    Raises:
-        MissingDependency: mujoco is not installed.
-        NotResettable: there is no `_get_obs`.
-    """
-    try:
-        import mujoco  # noqa: F401
-    except ModuleNotFoundError as error:
-        raise MissingDependency("this environment needs mujoco: pip install 'pbcs-ompl[mujoco]'") from error
-    if not callable(getattr(env, "_get_obs", None)):
-        raise NotResettable(f"{type(env).__name__} has no `_get_obs()`, so a restored state cannot be observed; "
-                              f"add it, or get_env_state and set_env_state")
 
 
 def has_map(env: Any) -> bool:

@@ -1,34 +1,31 @@
 """Finds by trying which numbers of MuJoCo an environment reads before they are written again."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
-from pbcs_ompl.resettable.actions import ActionMap
+from pbcs_ompl.resettable.actions import ActionMap, copied
 from pbcs_ompl.resettable.adapters.mujoco_state import ModelParts, Physics, ReadFirst, derived_arrays, overwrite
 from pbcs_ompl.resettable.memory.exploration import SEEDS, episodes
 from pbcs_ompl.resettable.memory.memory import Memory
 from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.rules import SUCCESS
+from pbcs_ompl.resettable.simulation import Simulation
 
 PROBED = (0, 1, 12, 30)
 """Where in an episode it is tried: after the reset and after steps."""
 
 
-def find_read_first(env: Any, observe: Callable[[], Any], physics: Physics, parts: ModelParts,
-                    memory: Memory) -> ReadFirst:
+def find_read_first(simulation: Simulation, physics: Physics, parts: ModelParts, memory: Memory) -> ReadFirst:
     """Return the numbers of `MjData` that steps or observations depend on beside the physics.
 
     Args:
-        env: The environment.
-        observe: Returns its observation.
+        simulation: The environment's.
         physics, parts, memory: What is saved of it.
     """
-    probe = _Probe(env, observe, physics, parts, memory)
-    found = ReadFirst(env.model, env.data, probe.depends_on)
-    for count, _ in enumerate(episodes(env, SEEDS[:1], PROBED[-1])):
+    probe = _Probe(simulation, physics, parts, memory)
+    found = ReadFirst(simulation.model, simulation.data, probe.depends_on)
+    for count, _ in enumerate(episodes(simulation.env, SEEDS[:1], PROBED[-1])):
         if count in PROBED and probe.begin():
-            found.look(env.data)
+            found.look(simulation.data)
             probe.restore()
     return found
 
@@ -36,17 +33,17 @@ def find_read_first(env: Any, observe: Callable[[], Any], physics: Physics, part
 class _Probe:
     """Overwrites numbers in one state and compares what the environment reports."""
 
-    def __init__(self, env: Any, observe: Callable[[], Any], physics: Physics, parts: ModelParts, memory: Memory):
-        self._env, self._observe = env, observe
+    def __init__(self, simulation: Simulation, physics: Physics, parts: ModelParts, memory: Memory):
+        self._simulation = simulation
         self._physics, self._parts, self._memory = physics, parts, memory
-        actions = ActionMap.of(env.action_space)
+        actions = ActionMap.of(simulation.env.action_space)
         self._action = actions.to_action(np.random.default_rng(1).uniform(actions.low, actions.high))
 
     def begin(self) -> bool:
         """Take the present state; return whether reports of it are the same twice."""
-        env = self._env
-        self._saved = self._physics.save(env.model, env.data), self._parts.save(env.model), self._memory.save()
-        self._derived = derived_arrays(env.model, env.data)
+        model, data = self._simulation.model, self._simulation.data
+        self._saved = self._physics.save(model, data), self._parts.save(model), self._memory.save()
+        self._derived = derived_arrays(model, data)
         self._expected = self._report([], 1.0)
         same = self._expected == self._report([], 1.0)
         self.restore()
@@ -54,12 +51,7 @@ class _Probe:
 
     def restore(self) -> None:
         """Go back to the state, numbers that are derived from it included."""
-        physics, parts, memory = self._saved
-        self._parts.load(self._env.model, parts)
-        self._memory.load(memory)
-        self._physics.load(self._env.model, self._env.data, physics)
-        for name, values in self._derived.items():
-            getattr(self._env.data, name)[:] = values
+        self._put_back([], 1.0)
 
     def depends_on(self, rows: list[tuple[str, int]]) -> bool:
         """Return whether reports change with rows of derived numbers."""
@@ -68,14 +60,25 @@ class _Probe:
     def _report(self, rows: list[tuple[str, int]], sign: float) -> list[bytes]:
         """Return what is observed and what a step reports, with the rows overwritten."""
         try:
-            self.restore()
-            overwrite(self._env.data, rows, sign)
-            seen = flat(self._observe()).tobytes()
-            self.restore()
-            overwrite(self._env.data, rows, sign)
-            observation, reward, terminated, truncated, info = self._env.step(np.array(self._action)[()])
+            self._put_back(rows, sign)
+            seen = flat(self._simulation.observed()).tobytes()
+            self._put_back(rows, sign)
+            observation, reward, terminated, truncated, info = self._simulation.env.step(copied(self._action))
         except Exception as error:  # an environment may refuse such numbers: then it reads them
             return [type(error).__name__.encode()]
-        success = bool(info.get("is_success", info.get("success", False)))
-        return [seen, flat(observation).tobytes(), np.array([reward, terminated, truncated, success], float).tobytes(),
-                self._physics.save(self._env.model, self._env.data).tobytes(), self._memory.save().tobytes()]
+        success = repr([info.get(key) for key in SUCCESS]).encode()
+        return [seen, flat(observation).tobytes(), np.array([reward, terminated, truncated], float).tobytes(), success,
+                self._physics.save(self._simulation.model, self._simulation.data).tobytes(),
+                self._memory.save().tobytes()]
+
+    def _put_back(self, rows: list[tuple[str, int]], sign: float) -> None:
+        """Go back to the state, with rows of derived numbers overwritten that the environment does not refresh."""
+        physics, parts, memory = self._saved
+        model, data = self._simulation.model, self._simulation.data
+        self._parts.load(model, parts)
+        self._memory.load(memory)
+        self._physics.load(model, data, physics)
+        for name, values in self._derived.items():
+            getattr(data, name)[:] = values
+        overwrite(data, rows, sign)
+        self._simulation.refresh()

@@ -85,13 +85,16 @@ class ModelParts:
         """Return the numbers that change, by name."""
         return {f"model.{name}": _rows(_get(model, name), rows) for name, rows in self._rows.items()}
 
-    def check(self, env: Any) -> None:
+    def check(self, model: Any, owner: str) -> None:
         """Refuse an environment whose model has changed elsewhere than before.
+
+        Args:
+            model: The model.
+            owner: The environment's name.
 
         Raises:
             NotResettable: says where.
         """
-        model = env.model
         for name in self._names:
             if name in self._large or _get(model, name) is None:
                 continue
@@ -100,7 +103,7 @@ class ModelParts:
                 before[self._rows[name]] = now[self._rows[name]]
             if (name not in self._rows and now.tobytes() != before.tobytes()) or (
                     name in self._rows and now.ndim and now.tobytes() != before.tobytes()):
-                raise NotResettable(f"{type(env).__name__} is not resettable: model.{name} has changed, which some "
+                raise NotResettable(f"{owner} is not resettable: model.{name} has changed, which some "
                                     f"hundred steps have not shown; change it in every reset")
 
     def _add(self, name: str, now: Array) -> None:

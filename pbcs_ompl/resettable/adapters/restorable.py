@@ -26,6 +26,8 @@ from pbcs_ompl.resettable.rules import (
 )
 from pbcs_ompl.resettable.task_env import TaskEnv
 
+GUARD_EVERY = 1024
+"""Saved states between two looks at what is taken for constant."""
 UNBOUNDED = 1e9
 """OMPL wants finite bounds. Dimensions that are not sampled get these."""
 
@@ -46,7 +48,9 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
     capabilities: frozenset[Capability] = frozenset({"visited", "exact"})
     perturb_by_rollouts = True
     exploring = False
-    """Whether steps are made only to see what range the feature has."""
+    """Whether steps are made only to see what range the feature has: no state of theirs is restored."""
+    largest = UNBOUNDED
+    """No number that is saved is larger."""
     goal_radius = 1.0
     """A state is a success if its distance to the goal is smaller, where the environment reports one."""
 
@@ -61,6 +65,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.action_space = inner.action_space
         self._head, self._distance = np.empty(0), 1.0
         self._has_goal_distance = False
+        self._saves = 0
         self.named: Any = None
         observation, _ = self.reset(seed=0)
         self.observation_space = Box(-np.inf, np.inf, observation.shape, np.float64)
@@ -72,7 +77,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.exploring = False
         if self.bounds.narrow:
             warnings.warn(narrow_words(self.bounds), stacklevel=2)
-        rest = np.full(saved + 1, UNBOUNDED)
+        rest = np.full(saved + 1, self.largest)
         self.state_low = np.concatenate([self.bounds.low, -rest])
         self.state_high = np.concatenate([self.bounds.high, rest])
         self.reset(seed=0)
@@ -112,8 +117,8 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         """Return what planners explore unless the user says otherwise."""
         return feature_rule("obs")
 
-    def reported_goal_distance(self, outcome: Outcome) -> float | None:
-        """Return the distance to the goal after `outcome`; None where the environment reports none."""
+    def reported_goal_distance(self, observation: Any) -> float | None:
+        """Return the distance to the goal that an observation of `inner` shows; None where it shows none."""
         return None
 
     def feature_box(self) -> tuple[Array, Array] | None:
@@ -152,8 +157,18 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         return flat(observation), float(reward), bool(terminated), bool(truncated), {**info, "is_success": success}
 
     def get_env_state(self) -> Array:
-        """Return the state [D]."""
-        return np.concatenate([self._head, self.save(), [self._distance]])
+        """Return the state [D].
+
+        Raises:
+            NotResettable: something has changed that is no part of it; this is looked at now and then.
+        """
+        self._saves += 1
+        if self._saves % GUARD_EVERY == 0:
+            self.check_constants()
+        features, saved = len(self._head), self.save()
+        state = np.empty(features + len(saved) + 1)
+        state[:features], state[features:-1], state[-1] = self._head, saved, self._distance
+        return state
 
     def set_env_state(self, state: Array) -> None:
         """Go back to a state [D].
@@ -203,12 +218,11 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
     def _store(self, outcome: Outcome) -> bool:
         """Keep feature and distance of what was reached; return whether it is a success."""
         self.named = self.inner.kept.last if isinstance(self.inner, TaskEnv) else outcome.observation
-        self._head = np.asarray(self._feature_of(outcome._replace(named=self.named)), dtype=np.float64).reshape(-1)
+        self._head = np.asarray(self._feature_of(Outcome(*outcome[:-1], self.named)), dtype=np.float64).reshape(-1)
         if not len(self._head):
             raise CallbackFailed("the feature function returned no numbers")
         success = self.is_success(outcome)
-        seen = outcome._replace(observation=self.named)
-        reported = None if self.goal_rule is not None else self.reported_goal_distance(seen)
+        reported = None if self.goal_rule is not None else self.reported_goal_distance(self.named)
         self._has_goal_distance = reported is not None
         if reported is None:
             self._distance = 0.0 if success else 1.0

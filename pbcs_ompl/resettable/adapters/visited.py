@@ -23,14 +23,17 @@ from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.memory.owned import holds_resource
 from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rewards import same_rewards
+from pbcs_ompl.resettable.simulation import holds_compiled_model
 
-FIRST_HASH = float(2**32)
-"""Smaller numbers are seeds."""
+FIRST_HASH, LAST_HASH = float(2**32), float(2**53)
+"""Smaller numbers are seeds; up to the last, numbers of float64 are whole."""
 PROOF_STEPS = 20
 
 
 class VisitedEnv(RestorableEnv):
     """Names what was visited and finds it again; a subclass says how."""
+
+    largest = LAST_HASH
 
     def __init__(self, inner: Any, goal: Any = None, feature: Any = None):
         self._name = 0.0
@@ -71,8 +74,7 @@ class VisitedEnv(RestorableEnv):
         seed = int(np.random.default_rng().integers(2**32)) if seed is None else seed
         observation, info = super().reset(seed=seed, options=options)
         self._name = float(seed)
-        self._observations[self._name] = flat(observation)
-        self.keep(self._name, None, None)
+        self._visit(flat(observation), None, None)
         return observation, info
 
     def step(self, action: Array) -> Any:
@@ -80,9 +82,14 @@ class VisitedEnv(RestorableEnv):
         before, action = self._name, copied(action)
         outcome = super().step(action)
         self._name = child_hash(before, action)
-        self._observations[self._name] = flat(outcome[0])
-        self.keep(self._name, before, action)
+        self._visit(flat(outcome[0]), before, action)
         return outcome
+
+    def _visit(self, observation: Array, before: float | None, action: Array | None) -> None:
+        """Keep the present state, unless it is never restored."""
+        if not self.exploring:
+            self._observations[self._name] = observation
+            self.keep(self._name, before, action)
 
     @abstractmethod
     def keep(self, name: float, before: float | None, action: Array | None) -> None:
@@ -186,14 +193,14 @@ class FreshEnv(ReplayedEnv):
 
 
 def child_hash(name: float, action: Array) -> float:
-    """Return the name of what follows a state under an action: a hash of both in [2**32, 2**53)."""
+    """Return the name of what follows a state under an action: a hash of both in [FIRST_HASH, LAST_HASH)."""
     digest = blake2b(struct.pack("<d", name) + np.ascontiguousarray(action).tobytes(), digest_size=8).digest()
-    return FIRST_HASH + float(int.from_bytes(digest, "little") % (2**53 - 2**32))
+    return FIRST_HASH + float(int.from_bytes(digest, "little") % int(LAST_HASH - FIRST_HASH))
 
 
 def copies_are_faithful(env: Any) -> bool:
     """Return whether a deep copy in the middle of an episode continues as the original does."""
-    if holds_resource(env):
+    if holds_resource(env) or holds_compiled_model(env):
         return False
     rng = np.random.default_rng(0)
     env.reset(seed=0)

@@ -1,8 +1,10 @@
 """The memory of an environment: its attributes that change, as numbers [M] of a state."""
 
+import math
 from collections.abc import Iterable, Mapping
 from copy import copy, deepcopy
 from enum import Enum
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -11,7 +13,7 @@ from pbcs_ompl.core.errors import InvalidState, NotResettable
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.memory.code import names_of
 from pbcs_ompl.resettable.memory.exploration import ABSENT, Changes, Seen, kind_of, refuse_opaque, refuse_random
-from pbcs_ompl.resettable.memory.owned import Path, find, look, put, remove, text_of
+from pbcs_ompl.resettable.memory.owned import Path, find, finder, look, put, remove, set_part, text_of
 from pbcs_ompl.resettable.memory.plain_values import (
     enum_name,
     enums_of,
@@ -27,8 +29,6 @@ from pbcs_ompl.resettable.task_env import bare
 LARGEST = 4096
 """Numbers that one attribute may add to a state."""
 SMALLEST_TEXT = 24
-GUARD_EVERY = 1024
-"""Saves between two looks at what is taken for constant."""
 FIRST_METHODS = ("reset", "step", "_get_obs")
 
 
@@ -36,7 +36,7 @@ class Memory:
     """Saves and restores what an environment keeps in attributes: its own, and those of the objects it owns.
 
     That is what has changed while the environment was explored, and what its methods set, whether it has changed or
-    not; see `code`. All else is taken for constant, and looked at now and then.
+    not; see `code`. All else is taken for constant; see `check_constants`.
 
     Args:
         env: The environment.
@@ -64,13 +64,13 @@ class Memory:
                            if not (self._is_unread(path) and _is_growing(seen))]
         self._enums = {enum_name(kind): kind for path in chosen for value in [changes.owned.plain.get(path)]
                        for kind in enums_of(value)}
-        self.size = sum(variable.size for variable in self._variables)
+        ends = np.cumsum([0, *(variable.size for variable in self._variables)]).tolist()
+        self._places, self.size = [slice(*ends_of) for ends_of in pairwise(ends)], ends[-1]
         self._constants = {path: seen.last for path, seen in changes.plain.items()
                            if path not in chosen and path[0].key not in self._besides and not self._is_unread(path)}
         self._before = {variable.path: before.get(variable.path, ABSENT) for variable in self._variables}
         self._shared = [(variable.path, first) for variable in self._variables
                         if (first := changes.first_name(variable.path)) is not None and first in chosen]
-        self._saves = 0
 
     def of(self, env: Any) -> Self:
         """Return the memory of another instance of the environment."""
@@ -85,13 +85,9 @@ class Memory:
 
     def save(self) -> Array:
         """Return the attributes as numbers [M]."""
-        self._saves += 1
-        if self._saves % GUARD_EVERY == 0:
-            self.check_constants()
-        saved, at = np.empty(self.size), 0
-        for variable in self._variables:
-            saved[at:at + variable.size] = variable.save(self._env)
-            at += variable.size
+        saved = np.empty(self.size)
+        for place, variable in zip(self._places, self._variables, strict=True):
+            saved[place] = variable.save(self._env)
         return saved
 
     def load(self, numbers: Array) -> None:
@@ -100,10 +96,8 @@ class Memory:
         Raises:
             InvalidState: the numbers are no such values.
         """
-        at = 0
-        for variable in self._variables:
-            variable.load(self._env, numbers[at:at + variable.size], self._enums)
-            at += variable.size
+        for place, variable in zip(self._places, self._variables, strict=True):
+            variable.load(self._env, numbers[place], self._enums)
         for path, first in self._shared:
             put(self._env, path, find(self._env, first))
 
@@ -151,6 +145,7 @@ class _Variable:
 
     def __init__(self, env: Any, path: Path, seen: Seen):
         self.path = path
+        self._find, self._find_owner, self._last = finder(path), finder(path[:-1]), path[-1]
         self._name = f"{type(bare(env)).__name__}: the attribute {text_of(path)!r}"
         self._kind = next(iter(seen.kinds)) if len(seen.kinds) == 1 else None
         self._in_place = seen.is_one_object and isinstance(seen.object, np.ndarray)
@@ -165,7 +160,7 @@ class _Variable:
     def read(self, env: Any) -> Any:
         """Return the value."""
         try:
-            return find(env, self.path)
+            return self._find(env)
         except (AttributeError, LookupError):
             return ABSENT
 
@@ -184,15 +179,15 @@ class _Variable:
         if self._kind is None:
             text = unpack(numbers)
             if text:
-                put(env, self.path, from_text(text, enums))
+                set_part(self._find_owner(env), self._last, from_text(text, enums))
             else:
                 remove(env, self.path)
         elif not isinstance(self._kind, tuple):
-            put(env, self.path, self._scalar(numbers[0]))
+            set_part(self._find_owner(env), self._last, self._scalar(numbers[0]))
         elif self._in_place:
-            find(env, self.path)[...] = numbers.reshape(self._kind[1])
+            self._find(env)[...] = numbers.reshape(self._kind[1])
         else:
-            put(env, self.path, numbers.reshape(self._kind[1]).astype(self._kind[0]))
+            set_part(self._find_owner(env), self._last, numbers.reshape(self._kind[1]).astype(self._kind[0]))
 
     def _fits(self, value: Any) -> bool:
         if isinstance(self._kind, tuple):
@@ -201,7 +196,7 @@ class _Variable:
 
     def _scalar(self, number: float) -> Any:
         assert self._kind is not None
-        if not np.isfinite(number) and self._kind in (bool, int):
+        if self._kind in (bool, int) and not math.isfinite(number):
             raise InvalidState(f"{self._name} cannot be {number}")
         return self._kind(number)
 

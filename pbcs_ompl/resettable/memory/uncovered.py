@@ -11,8 +11,10 @@ from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap, copied
 from pbcs_ompl.resettable.memory.code import names_of
 from pbcs_ompl.resettable.memory.exploration import Changes, episodes, refuse_random
+from pbcs_ompl.resettable.memory.generators import states
 from pbcs_ompl.resettable.memory.owned import Path, find, look, put, text_of
 from pbcs_ompl.resettable.memory.plain_values import same
+from pbcs_ompl.resettable.rules import SUCCESS
 from pbcs_ompl.resettable.task_env import bare
 
 STEPS = 20
@@ -29,13 +31,15 @@ def refuse_uncovered(env: Any) -> None:
         env: The environment without wrappers; it is reset and stepped.
 
     Raises:
-        NotResettable: there is such an attribute, or steps draw random numbers; says which.
+        NotResettable: there is such an attribute, or steps draw random numbers from a generator that
+            `set_env_state` does not set back; says which.
     """
     env.reset(seed=0)
     changes = Changes(env)
     for event in episodes(env):
         changes.add(event)
-    refuse_random(bare(env), changes)
+    if changes.random and not _sets_generator(env, changes.random):
+        refuse_random(bare(env), changes)
     names = names_of({type(owner) for owner in changes.owned.owners.values()}, ("step",))
     for path, seen in changes.plain.items():
         name = next(step.key for step in reversed(path) if not step.is_item)
@@ -44,6 +48,19 @@ def refuse_uncovered(env: Any) -> None:
             raise NotResettable(f"{type(bare(env)).__name__} is not resettable: its steps change the attribute "
                                 f"{text_of(path)!r} and read it, and set_env_state does not set it; make it part of "
                                 f"what get_env_state returns")
+
+
+def _sets_generator(env: Any, name: str) -> bool:
+    """Return whether `set_env_state` sets the generator of a name back, whatever was drawn from it."""
+    state = _middle(env)
+    drawn = []
+    for _ in range(2):
+        env.set_env_state(state.copy())
+        drawn.append(states(look(bare(env)).generators)[name])
+        for action in _actions(env)[:STEPS // 2]:
+            if any(env.step(copied(action))[2:4]):
+                break
+    return drawn[0] == drawn[1]
 
 
 def _matters(env: Any, path: Path) -> bool:
@@ -105,8 +122,8 @@ def _reported(env: Any, state: Array, path: Path, value: Any) -> list[tuple[Any,
     reports = []
     for action in _actions(env):
         observation, reward, terminated, truncated, info = env.step(copied(action))
-        success = bool(info.get("is_success", info.get("success", False)))
-        reports.append((np.array(observation).tobytes(), float(reward), bool(terminated), bool(truncated), success,
+        success = [str(info.get(key)) for key in SUCCESS]
+        reports.append((np.array(observation).tobytes(), float(reward), bool(terminated), bool(truncated), *success,
                         np.array(env.get_env_state(), dtype=np.float64).tobytes()))
         if terminated or truncated:
             break

@@ -8,17 +8,16 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pbcs_ompl.core.checked import checked
-from pbcs_ompl.core.errors import DamagedFile, PbcsError, RunFolderError
+from pbcs_ompl.core.errors import DamagedFile, PbcsError
 from pbcs_ompl.core.formatting import format_number, format_value
 from pbcs_ompl.core.utf8 import utf8
-from pbcs_ompl.results.files import write_atomically, write_errors
+from pbcs_ompl.results.files import check_replaceable, write_atomically, write_errors
 from pbcs_ompl.results.folder import find_folders
 from pbcs_ompl.results.report.section import DAMAGED, Section, damaged_section, make_section
 
 REPORT = "report.html"
 GENERATOR = '<meta name="generator" content="pbcs report">'
 """Marks a page of ours, which a new one may replace."""
-HEAD_BYTES = 1024
 
 
 class Report(NamedTuple):
@@ -59,7 +58,7 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Report:
     paths = find_folders(root)
     page, single = root / REPORT if out is None else Path(out), paths == [root]
     with write_errors(page):
-        _check_replaceable(page)
+        check_replaceable(page, GENERATOR, "pbcs report")
     templates = _templates()
     shown = [_shown(path, root, number, templates, single) for number, path in enumerate(paths, start=1)]
     sections = [section for section, _ in shown]
@@ -96,20 +95,6 @@ def _shown(path: Path, root: Path, number: int, templates: Environment, single: 
             raise DamagedFile(f"{path} cannot be shown: {error!r}") from error
         section = damaged_section(path, root, f"{path} cannot be shown: {error!r}")
     return section, text(section, number, single)
-
-
-def _check_replaceable(page: Path) -> None:
-    if page.is_dir():
-        raise RunFolderError(f"cannot write {page}: it is a folder; name a file")
-    if page.exists() and not page.is_file():
-        raise RunFolderError(f"cannot write {page}: it is no regular file; choose another --out")
-    if page.exists() and GENERATOR.encode() not in _head(page):
-        raise RunFolderError(f"{page} was not written by pbcs report; choose another --out, or remove it first")
-
-
-def _head(page: Path) -> bytes:
-    with open(page, "rb") as file:
-        return file.read(HEAD_BYTES)
 
 
 def _templates() -> Environment:

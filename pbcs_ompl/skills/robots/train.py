@@ -18,6 +18,7 @@ from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, RunFolderError
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.signals import interruptible
+from pbcs_ompl.core.text_values import parse_json
 from pbcs_ompl.core.types import ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.checksums import changed_files
@@ -126,7 +127,7 @@ def resume_follower(folder: str | Path, *, max_transitions: int | None = None, t
         if max_transitions is not None:
             opened.write_config(read_toml(opened.path / CONFIG) | {"max_transitions": max_transitions})
         run = _Run(EnvSpec.from_dict(config["environment"], trusted=trust),
-                   tuple(json.loads(text) for text in config["worlds"]), RobotSettings.from_dict(config["settings"]),
+                   _worlds(opened.path / CONFIG, config["worlds"]), RobotSettings.from_dict(config["settings"]),
                    PPOSettings.from_dict(config["agent_settings"]), config["seed"],
                    max_transitions or config["max_transitions"], on_progress)
         return run.make(opened, resumed=True)
@@ -208,6 +209,21 @@ class _Run:
             follower.save(folder.path / FOLLOWER)
             folder.write_result(result.summary())
         return result
+
+
+def _worlds(path: Path, texts: list[str]) -> tuple[dict[str, Any], ...]:
+    """Return the options of the worlds that a config.toml holds as JSON texts."""
+    worlds = []
+    for text in texts:
+        try:
+            worlds.append(parse_json(text))
+        except ValueError as error:
+            raise DamagedFile(f"{path} is damaged: in worlds, {text[:80]!r} is no JSON: {error}") from error
+        if not isinstance(worlds[-1], dict):
+            raise DamagedFile(f"{path} is damaged: in worlds, {text[:80]!r} is no object of options")
+    if not worlds:
+        raise DamagedFile(f"{path} is damaged: worlds is empty")
+    return tuple(worlds)
 
 
 def _checkpoint(training: RobotTraining, path: Path, seconds: float) -> None:

@@ -1,5 +1,5 @@
 // OMPL's own control planners on mazes, in C++ alone. Each line of the input is a run:
-//     MAZE PLANNER MOST_STEPS CELL SEED TRANSITIONS SECONDS
+//     MAZE PLANNER MOST_STEPS CELL SEED TRANSITIONS SECONDS BLIND
 // and is answered by: solved transitions seconds path_steps. Seconds are those of the thread's CPU in solve().
 #include "maze.hpp"
 #include <ctime>
@@ -22,24 +22,26 @@ namespace oc = ompl::control;
 using State = ob::RealVectorStateSpace::StateType;
 using Control = oc::RealVectorControlSpace::ControlType;
 
-// The disc around the goal. It cannot be sampled: no planner knows where it is. SST looks for better paths as long as it
+// The disc around the goal. It cannot be sampled, but KPIECE1 ranks cells by the distance to it, unless the disc is blind:
+// then that is 1 everywhere outside. SST looks for better paths as long as it
 // may, so the disc says when a state was in it.
 class Disc : public ob::GoalRegion {
 public:
-    Disc(const ob::SpaceInformationPtr &si, const Maze &maze, bool &reached)
-        : ob::GoalRegion(si), maze(maze), reached(reached) {
+    Disc(const ob::SpaceInformationPtr &si, const Maze &maze, bool &reached, bool blind)
+        : ob::GoalRegion(si), maze(maze), reached(reached), blind(blind) {
         setThreshold(maze.goal_radius);
     }
     double distanceGoal(const ob::State *state) const override {
         const double *position = state->as<State>()->values;
         const double distance = maze.goal_distance(position[0], position[1]);
         reached = reached || distance < threshold_;
-        return distance;
+        return blind && distance >= threshold_ ? 1.0 : distance;
     }
 
 private:
     const Maze &maze;
     bool &reached;
+    bool blind;
 };
 
 static double cpu_seconds() {
@@ -48,9 +50,13 @@ static double cpu_seconds() {
     return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
 }
 
-static ob::PlannerPtr make_planner(const std::string &name, const oc::SpaceInformationPtr &si) {
-    if (name == "KPIECE1")
-        return std::make_shared<oc::KPIECE1>(si);
+static ob::PlannerPtr make_planner(const std::string &name, const oc::SpaceInformationPtr &si, bool blind) {
+    if (name == "KPIECE1") {
+        auto planner = std::make_shared<oc::KPIECE1>(si);
+        if (blind)
+            planner->setGoalBias(0.0); // this is about the motions nearest to the goal
+        return planner;
+    }
     if (name == "EST")
         return std::make_shared<oc::EST>(si);
     if (name == "RRT")
@@ -76,7 +82,8 @@ static ob::StateSpacePtr make_space(const Maze &maze, double cell) {
     return space;
 }
 
-static void run(const Maze &maze, const std::string &name, int most_steps, double cell, long transitions, double limit) {
+static void run(const Maze &maze, const std::string &name, int most_steps, double cell, long transitions, double limit,
+                bool blind) {
     auto space = make_space(maze, cell);
     auto controls = std::make_shared<oc::RealVectorControlSpace>(space, 2);
     ob::RealVectorBounds box(2);
@@ -99,8 +106,8 @@ static void run(const Maze &maze, const std::string &name, int most_steps, doubl
     start[0] = maze.start_x, start[1] = maze.start_y;
     setup.addStartState(start);
     bool reached = false;
-    setup.setGoal(std::make_shared<Disc>(si, maze, reached));
-    setup.setPlanner(make_planner(name, si));
+    setup.setGoal(std::make_shared<Disc>(si, maze, reached, blind));
+    setup.setPlanner(make_planner(name, si, blind));
     setup.setup();
     auto problem = setup.getProblemDefinition();
     const double began = cpu_seconds();
@@ -124,8 +131,9 @@ int main() {
     unsigned long seed;
     double cell, limit;
     long transitions;
-    while (std::cin >> path >> name >> most_steps >> cell >> seed >> transitions >> limit) {
+    bool blind;
+    while (std::cin >> path >> name >> most_steps >> cell >> seed >> transitions >> limit >> blind) {
         ompl::RNG::setSeed(seed);
-        run(Maze(path), name, most_steps, cell, transitions, limit);
+        run(Maze(path), name, most_steps, cell, transitions, limit, blind);
     }
 }

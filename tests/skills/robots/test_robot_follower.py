@@ -1,6 +1,7 @@
 """A follower that was trained once drives along any line: its parts, its training on points, its files."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, InvalidState, Mismatch, RunFolderError
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.results.files import read_toml, write_toml
 from pbcs_ompl.skills.path_following.follower import Progress
 from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.policy import ObservationTransform
@@ -167,6 +169,16 @@ def test_wrong_input_is_named(trained: FollowerResult) -> None:
         trained.follower.controller(Line(np.zeros((2, 2)), 0.1), entries=[0, 1, 2])
     with pytest.raises(InvalidOption, match="in its plane"):
         trained.follower.controller(Line(np.zeros((2, 3)), 0.1))
+
+
+@pytest.mark.parametrize("worlds", ['["evil:x"]', '["5"]', '[]', '["[[[["]'])
+def test_worlds_of_a_config_that_was_changed(trained: FollowerResult, tmp_path: Path, worlds: str) -> None:
+    assert trained.out is not None
+    copy = Path(shutil.copytree(trained.out, tmp_path / "run"))
+    config = read_toml(copy / "config.toml") | {"worlds": json.loads(worlds)}
+    write_toml(copy / "config.toml", config)
+    with pytest.warns(UserWarning, match="was changed"), pytest.raises(DamagedFile, match="worlds"):
+        resume_follower(copy)
 
 
 def test_the_command_line_trains_and_evaluates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

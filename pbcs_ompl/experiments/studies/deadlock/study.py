@@ -10,14 +10,16 @@ from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.registry import load
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.diagnostics import value_slices
+from pbcs_ompl.diagnostics import returns_of, value_slices
 from pbcs_ompl.experiments.diagnostic_batch import DiagnosticBatch
 from pbcs_ompl.experiments.stacked_training import LoopSettings, StackedTraining, chunks
 from pbcs_ompl.resettable import make
 
 MAPPED_STATES = np.linspace(0.0, 1.0, 101)
 HORIZON = 50
-MOST_CRITICS = 2
+MOST_CRITICS = 3
+DIGITS = 5
+"""Of the numbers in a record."""
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
@@ -39,7 +41,8 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     agent, probe = _agent(settings, model, settings["seeds"]), DiagnosticBatch(model)
     discount = settings["agent_settings"]["discount"]
     observers = probe.observers() | {
-        "distance_to_returns": lambda agent: probe.distance_to_returns(agent, discount, HORIZON)}
+        "distance_to_returns": lambda agent: probe.distance_to_returns(agent, discount, HORIZON),
+        "mean_action": probe.mean_action}
     expert_after = settings.get("expert_after")
     expert: Callable[[Array], Array] | None = None if expert_after is None else (
         lambda states: np.broadcast_to(model.action_low, (len(states), 1)))
@@ -48,7 +51,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     curves = training.run()
     failed = np.flatnonzero(~curves.success[-1][training.active])
     return {"variant": settings["variant"], "loop": settings["loop"], "expert_after": expert_after, **curves.summary(),
-            "critics": _critics(training.agent, failed[:MOST_CRITICS]) if len(failed) else []}
+            "critics": _critics(model, training.agent, failed[:MOST_CRITICS]) if len(failed) else []}
 
 
 def _agent(settings: dict[str, Any], model: ResettableModel, seeds: list[int]) -> StackedAgent:
@@ -61,13 +64,17 @@ def _agent(settings: dict[str, Any], model: ResettableModel, seeds: list[int]) -
     return agent
 
 
-def _critics(agent: StackedAgent, failed: IndexArray) -> list[dict[str, Any]]:
-    """Return Q along the states and the actions, and the actor's actions, of some failed seeds of the stack."""
+def _critics(model: ResettableModel, agent: StackedAgent, failed: IndexArray) -> list[dict[str, Any]]:
+    """Return Q and Q^pi along the states and the actions, and the actor's actions, of some seeds of the stack."""
     states = np.broadcast_to(MAPPED_STATES[:, None], (len(agent.seeds), len(MAPPED_STATES), 1))
     line, values = value_slices(agent.value, states, agent.action_low, agent.action_high)
     actions = agent.act(states)[..., 0]
+    here, controls = (np.broadcast_to(grid.reshape(-1, 1), (len(agent.seeds), grid.size, 1))
+                      for grid in np.meshgrid(MAPPED_STATES, line, indexing="ij"))
+    returns = returns_of(model, agent.act, here, controls, agent.settings.discount, HORIZON).reshape(values.shape)
     return [{"seed": agent.seeds[index], "states": MAPPED_STATES.tolist(), "actions": line.tolist(),
-             "values": values[index].round(5).tolist(), "chosen": actions[index].tolist()} for index in failed]
+             "values": values[index].round(DIGITS).tolist(), "returns": returns[index].round(DIGITS).tolist(),
+             "chosen": actions[index].round(DIGITS).tolist()} for index in failed]
 
 
 def _fill_without_reward(agent: StackedAgent, count: int) -> None:
@@ -87,12 +94,14 @@ def _drift(settings: dict[str, Any]) -> dict[str, Any]:
     seeds = list(range(drift["seeds"]))
     agent, probe = _agent(settings, model, seeds), DiagnosticBatch(model)
     _fill_without_reward(agent, drift["transitions"])
-    rows = {"largest_value": [probe.largest_value(agent)], "largest_action": [probe.largest_action(agent)]}
+    observers = {"largest_value": probe.largest_value, "largest_action": probe.largest_action,
+                 "mean_action": probe.mean_action}
+    rows = {name: [observe(agent)] for name, observe in observers.items()}
     for _ in range(drift["updates"] // drift["every"]):
         agent.train(drift["every"])
-        rows["largest_value"].append(probe.largest_value(agent))
-        rows["largest_action"].append(probe.largest_action(agent))
+        for name, observe in observers.items():
+            rows[name].append(observe(agent))
     steps = np.arange(len(rows["largest_value"])) * drift["every"]
-    curves = {name: np.array(row).tolist() for name, row in rows.items()}
+    curves = {name: np.array(row).round(DIGITS).tolist() for name, row in rows.items()}
     return {"variant": "drift", "updates": steps.tolist(), **curves}
 

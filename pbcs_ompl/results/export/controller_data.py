@@ -1,0 +1,158 @@
+"""A trained controller as plain values and arrays: what `pbcs_ompl.deploy` and other formats compute with."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pbcs_ompl import deploy
+from pbcs_ompl.agents.policy import Policy
+from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.robot import Robot
+from pbcs_ompl.core.types import Array
+from pbcs_ompl.resettable.actions import ActionMap
+from pbcs_ompl.results.export.meaning import entry_names
+from pbcs_ompl.skills.chain import SkillChain
+from pbcs_ompl.skills.observed_sets import ObservedBall, ObservedClassifier
+from pbcs_ompl.skills.path_following.chain import FollowChain
+from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.robots.follower import RobotFollower
+
+PROBES = 16
+"""Observations by which a robot's own frame is recognised."""
+
+
+class ControllerData(NamedTuple):
+    """A controller without its classes: `words` are plain values, as JSON holds them."""
+
+    words: dict[str, Any]
+    arrays: dict[str, np.ndarray]
+
+
+def controller_data(controller: SkillChain | FollowChain | RobotFollower, line: Line | None = None) -> ControllerData:
+    """Return a controller as plain values and arrays.
+
+    Args:
+        controller: The controller.
+        line: The line that a robot's follower begins with; None for none.
+
+    Raises:
+        InvalidOption: the robot's own frame is of an unknown kind.
+    """
+    if isinstance(controller, SkillChain):
+        return _chain(controller)
+    return _robot(controller, line) if isinstance(controller, RobotFollower) else _follower(controller)
+
+
+def _chain(chain: SkillChain) -> ControllerData:
+    policies = [skill.policy for skill in chain.skills]
+    transforms = [policy.transform for policy in policies]
+    parts = [(index, part) for index, skill in enumerate(chain.skills) for part in skill.entry.parts]
+    balls = [(owner, part) for owner, part in parts if isinstance(part, ObservedBall)]
+    learnt = [(owner, part) for owner, part in parts if isinstance(part, ObservedClassifier)]
+    owners = np.zeros((len(parts), len(policies)))
+    owners[np.arange(len(parts)), [owner for owner, _ in [*balls, *learnt]]] = 1.0
+    size = len(transforms[0].origin)
+    arrays = {"origins": np.array([one.origin for one in transforms]),
+              "scales": np.array([one.scale for one in transforms]), "owners": owners,
+              "ball.centers": np.array([ball.center for _, ball in balls]).reshape(-1, size),
+              "ball.weights": np.array([ball.weights for _, ball in balls]).reshape(-1, size),
+              "ball.squares": np.array([ball.radius for _, ball in balls]) ** 2}
+    for index, (_, one) in enumerate(learnt):
+        arrays |= {f"classifier{index}.{name}": np.asarray(getattr(one, name)) for name in
+                   ("origin", "scale", "weights_1", "bias_1", "weights_2", "bias_2", "confidence")}
+    words = {"kind": "chain", "classifiers": len(learnt), "memory": {"skill": 0},
+             "time_limit": chain.time_limit, "reset_seed": chain.reset_seed}
+    return _with_networks(words, arrays, [policy.actor for policy in policies], chain.environment, chain.actions, size)
+
+
+def _follower(chain: FollowChain) -> ControllerData:
+    view, line = chain.view, chain.line
+    size = len(view.normaliser.origin)
+    arrays = {"line": line.points, "entries": view.entries, "unit": view.unit, "origin": view.normaliser.origin,
+              "scale": view.normaliser.scale, "firsts": np.array(chain.firsts),
+              "distances": _points(view.distances, line.spacing)}
+    words = {"kind": "follower", "memory": {"pointer": 0, "stalled": -1}, "patience": view.patience,
+             "reach": _reach(view.window, line.spacing), "spacing": line.spacing, "time_limit": chain.time_limit,
+             "reset_seed": chain.reset_seed}
+    return _with_networks(words, arrays, chain.policies, chain.environment, chain.actions, size)
+
+
+def _robot(follower: RobotFollower, line: Line | None) -> ControllerData:
+    view, robot = follower.view, follower.view.robot
+    size = len(view.normaliser.origin) + 2
+    arrays = {"entries": np.array(robot.place), "unit": np.ones(2), "origin": view.normaliser.origin,
+              "scale": view.normaliser.scale, "firsts": np.array([0]),
+              "distances": _points(view.distances, follower.spacing),
+              "half": _points(np.median(view.distances), follower.spacing),
+              "side_observations": np.array([one.observation for one in robot.symmetries]),
+              "side_actions": np.array([one.action for one in robot.symmetries])}
+    if line is not None:
+        arrays["line"] = line.points
+    words = {"kind": "robot follower", "memory": {"pointer": 0, "stalled": -1, "side": -1}, "patience": view.patience,
+             "reach": _reach(view.window, follower.spacing), "spacing": follower.spacing,
+             "speeds": _first_speed(robot, size)}
+    return _with_networks(words, arrays, [follower.policy], follower.environment, follower.actions, size)
+
+
+def _with_networks(words: dict[str, Any], arrays: dict[str, Any], policies: Sequence[Policy], environment: EnvSpec,
+                   actions: ActionMap, size: int) -> ControllerData:
+    """Add what all kinds have: the networks, the task, and the meaning of observations and actions.
+
+    Args:
+        words, arrays: What the kind has.
+        policies: In the order of execution.
+        environment: The task.
+        actions: Its action space.
+        size: Length O of an observation.
+    """
+    arrays = {**arrays, "low": policies[0].action_low, "high": policies[0].action_high,
+              "first_action": actions.first, "last_action": actions.last}
+    for index, policy in enumerate(policies):
+        layers = {name: array for name, array in policy.to_arrays().items() if name not in ("low", "high")}
+        arrays |= {f"network{index}.{name}": array for name, array in layers.items()}
+    action = {"shape": list(actions.shape), "dtype": str(actions.first.dtype), "low": actions.first.tolist(),
+              "high": actions.last.tolist()}
+    whole = {"format": deploy.FORMAT, **words, "networks": len(policies), "environment": environment.to_dict(),
+             "observation": entry_names(environment, size), "action": action}
+    return ControllerData(whole, arrays)
+
+
+def _points(lengths: Array | float, spacing: float) -> np.ndarray:
+    """Return lengths of a line as numbers of its points."""
+    return np.rint(np.asarray(lengths) / spacing).astype(np.int64)
+
+
+def _reach(window: float, spacing: float) -> int:
+    return max(1, round(window / spacing))
+
+
+def _first_speed(robot: Robot, size: int) -> int:
+    """Return the entry of an observation where the speed of a robot's free joint begins; 0 for one without heading.
+
+    A robot says where it looks and how it turns by functions. The two kinds that files can hold are recognised by what
+    these functions return for random observations, so that a wrong guess is not possible.
+
+    Raises:
+        InvalidOption: it is of neither kind.
+    """
+    rng = np.random.default_rng(0)
+    seen, angles = rng.normal(size=(PROBES, size)), rng.uniform(-np.pi, np.pi, PROBES)
+    if not robot.heading(seen).any() and np.array_equal(
+            np.delete(robot.turned(seen, np.zeros(PROBES)), robot.place, axis=1), np.delete(seen, robot.place, axis=1)):
+        return 0
+    for first in range(7, size - 1):
+        if _is_free_joint(robot, seen, angles, first):
+            return first
+    raise InvalidOption(f"{type(robot).__name__} cannot leave the toolkit: its heading and turns are not those of a "
+                        "robot without heading, nor of one whose observation begins with place and quaternion of a "
+                        "free joint")
+
+
+def _is_free_joint(robot: Robot, seen: Array, angles: Array, first: int) -> bool:
+    kind = deploy.FreeJoint(first)
+    c, s = kind.heading(seen)
+    ours, theirs = (np.delete(rows, robot.place, axis=1) for rows in
+                    (kind.turned(seen, np.cos(angles), np.sin(angles)), robot.turned(seen, angles)))
+    return bool(np.allclose(np.arctan2(s, c), robot.heading(seen)) and np.allclose(ours, theirs))

@@ -1,0 +1,266 @@
+"""A whole controller as one ONNX graph: what it sees, which network acts, and the limits of actions.
+
+What `pbcs_ompl.deploy` keeps between steps is an input and an output here: "skill" goes in, "next_skill" comes out. All
+numbers but those of the networks are float64, so that a controller switches where it did before.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl import deploy
+from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.results.export.controller_data import ControllerData
+from pbcs_ompl.results.export.onnx_graph import Graph
+from pbcs_ompl.results.files import write_atomically
+
+BATCH = "episodes"
+
+
+def write_onnx(data: ControllerData, folder: Path) -> list[Path]:
+    """Write controller.onnx into a folder, and return its path.
+
+    Args:
+        data: The controller.
+        folder: Where.
+
+    Raises:
+        MissingDependency: onnx is not installed.
+        InvalidOption: its networks have different shapes.
+        RunFolderError: the file cannot be written.
+    """
+    content = onnx_model(data).SerializeToString()
+    path = folder / "controller.onnx"
+    write_atomically(path, lambda file: file.write(content))
+    return [path]
+
+
+def onnx_model(data: ControllerData) -> Any:
+    """Return a controller as an `onnx.ModelProto`; see `write_onnx`.
+
+    Its metadata are the words of the controller, each as JSON: among them "observation", the meaning of its entries,
+    "action", and "memory", the values that the memory begins with.
+    """
+    words, arrays = data
+    graph = Graph()
+    size = len(words["observation"])
+    seen = graph.input("observation", (BATCH, size), np.float64)
+    memory = {name: graph.input(name, (BATCH,), np.int64) for name in words["memory"]}
+    if words["kind"] == "robot follower":
+        line = graph.input("line", ("points", 2), np.float64)
+    else:
+        line = graph.constant(arrays["line"]) if "line" in arrays else ""
+    steps = {"chain": _chain, "follower": _follower, "robot follower": _robot}
+    inputs, chosen, after = steps[words["kind"]](graph, data, seen, memory, line)
+    controls = _networks(graph, data, inputs, chosen)
+    if words["kind"] == "robot follower":
+        turn = graph("Gather", arrays["side_actions"], after["side"], axis=0)
+        controls = graph("Squeeze", graph("MatMul", graph("Unsqueeze", controls, [1]), turn), [1])
+    shape = words["action"]["shape"]
+    graph.output("action", _actions(graph, data, controls), (BATCH, *shape), arrays["first_action"].dtype)
+    for name, value in after.items():
+        graph.output(f"next_{name}", value, (BATCH,), np.int64)
+    return graph.model({name: json.dumps(value) for name, value in words.items()})
+
+
+def _networks(graph: Graph, data: ControllerData, inputs: str, chosen: str) -> str:
+    """Return the controls [B, A] of the networks `chosen` [B]; the parameters of all are stacked."""
+    arrays, count = data.arrays, data.words["networks"]
+    depth = sum(name.startswith("network0.weight") for name in arrays)
+    values = graph("Unsqueeze", graph.cast(inputs, np.float32), [1])
+    for layer in range(depth):
+        weight, bias, *norm = (_stacked(graph, arrays, count, f"{part}_{layer}", chosen)
+                               for part in ("weight", "bias", "gain", "shift") if f"network0.{part}_{layer}" in arrays)
+        values = graph("Add", graph("MatMul", values, weight), graph("Unsqueeze", bias, [1]))
+        if norm:
+            values = _normalised(graph, values, *(graph("Unsqueeze", part, [1]) for part in norm))
+        if layer < depth - 1:
+            values = graph("Relu", values)
+    raw = graph.cast(graph("Squeeze", graph("Tanh", values), [1]), np.float64)
+    half = 0.5 * (arrays["high"] - arrays["low"])
+    controls = graph("Add", graph("Mul", graph("Add", raw, 1.0), half), arrays["low"])
+    return graph("Min", graph("Max", controls, arrays["low"]), arrays["high"])
+
+
+def _stacked(graph: Graph, arrays: dict[str, Any], count: int, name: str, chosen: str) -> str:
+    """Return the parameters `name` of the networks `chosen` [B, ...]."""
+    each = [arrays[f"network{index}.{name}"] for index in range(count)]
+    if any(one.shape != each[0].shape for one in each):
+        raise InvalidOption(f"networks of the shapes {sorted({one.shape for one in each})}; ONNX files hold policies "
+                            "of one shape: use --to numpy")
+    return graph("Gather", np.array(each), chosen, axis=0)
+
+
+def _normalised(graph: Graph, values: str, gain: str, shift: str) -> str:
+    centred = graph("Sub", values, graph("ReduceMean", values, [-1], keepdims=1))
+    variance = graph("ReduceMean", graph("Mul", centred, centred), [-1], keepdims=1)
+    deviation = graph("Sqrt", graph("Add", variance, np.float32(deploy.LAYER_NORM_EPSILON)))
+    return graph("Add", graph("Mul", graph("Div", centred, deviation), gain), shift)
+
+
+def _actions(graph: Graph, data: ControllerData, controls: str) -> str:
+    """Return the actions [B, *shape] for controls [B, A]."""
+    first, last = data.arrays["first_action"], data.arrays["last_action"]
+    if first.dtype.kind in "iub":
+        controls = graph("Floor", graph("Add", controls, 0.5))
+    limited = graph("Min", graph("Max", controls, first.astype(np.float64)), last.astype(np.float64))
+    actions = graph.cast(limited, first.dtype)
+    if first.dtype == np.float32:  # rounding must not lead outside
+        actions = graph("Min", graph("Max", actions, first), last)
+    return graph("Reshape", actions, np.array([-1, *data.words["action"]["shape"]]))
+
+
+Step = tuple[str, str, dict[str, str]]
+"""What networks see, which of them acts, and the memory after the step."""
+
+
+def _chain(graph: Graph, data: ControllerData, seen: str, memory: dict[str, str], line: str) -> Step:
+    arrays, skill = data.arrays, memory["skill"]
+    if len(arrays["owners"]):
+        outside = graph("MatMul", graph.cast(graph("Not", _parts(graph, data, seen)), np.float64), arrays["owners"])
+        inside = graph.cast(graph("Less", outside, 0.5), np.int64)
+        order = np.arange(len(arrays["origins"]))
+        skill = graph("Max", skill, graph("ReduceMax", graph("Mul", inside, order), [-1], keepdims=0))
+    moved = graph("Sub", seen, graph("Gather", arrays["origins"], skill, axis=0))
+    return graph("Div", moved, graph("Gather", arrays["scales"], skill, axis=0)), skill, {"skill": skill}
+
+
+def _parts(graph: Graph, data: ControllerData, seen: str) -> str:
+    """Return which parts of entries observations lie in [B, N]: balls, then classifiers."""
+    words, arrays = data
+    away = graph("Sub", graph("Unsqueeze", seen, [1]), arrays["ball.centers"][None])
+    squares = graph("ReduceSum", graph("Mul", graph("Mul", away, away), arrays["ball.weights"][None]), [-1], keepdims=0)
+    parts = [graph("LessOrEqual", squares, arrays["ball.squares"])] if len(arrays["ball.squares"]) else []
+    for index in range(words["classifiers"]):
+        own = {name: arrays[f"classifier{index}.{name}"] for name in
+               ("origin", "scale", "weights_1", "bias_1", "weights_2", "bias_2", "confidence")}
+        normal = graph("Div", graph("Sub", seen, own["origin"]), own["scale"])
+        hidden = graph("Tanh", graph("Add", graph("MatMul", normal, own["weights_1"]), own["bias_1"]))
+        chance = graph("Sigmoid", graph("Add", graph("MatMul", hidden, own["weights_2"]), own["bias_2"]))
+        parts.append(graph("GreaterOrEqual", chance, own["confidence"]))
+    return graph("Concat", *parts, axis=-1)
+
+
+def _follower(graph: Graph, data: ControllerData, seen: str, memory: dict[str, str], line: str) -> Step:
+    arrays = data.arrays
+    places = graph("Div", graph.columns(seen, arrays["entries"]), arrays["unit"])
+    pointer, stalled = _advanced(graph, data, places, memory, line)
+    ahead = graph("Flatten", _ahead(graph, line, places, pointer, arrays["distances"]))
+    normal = graph("Div", graph("Sub", seen, arrays["origin"]), arrays["scale"])
+    inputs = graph("Concat", normal, ahead, _share(graph, data, stalled), axis=-1)
+    past = graph.cast(graph("GreaterOrEqual", graph("Unsqueeze", pointer, [1]), arrays["firsts"]), np.int64)
+    chosen = graph("Sub", graph("ReduceSum", past, [-1], keepdims=0), 1)
+    return inputs, chosen, {"pointer": pointer, "stalled": stalled}
+
+
+def _last(graph: Graph, line: str) -> str:
+    """Return the pointer of the end of a line."""
+    return graph("Sub", graph("Gather", graph("Shape", line), 0, axis=0), 1)
+
+
+def _advanced(graph: Graph, data: ControllerData, places: str, memory: dict[str, str], line: str) -> tuple[str, str]:
+    """Return the pointers [B] after a step, and how long they have stood still [B]."""
+    reach = np.arange(data.words["reach"] + 1)
+    candidates = graph("Min", graph("Add", graph("Unsqueeze", memory["pointer"], [1]), reach), _last(graph, line))
+    away = graph("Sub", graph("Gather", line, candidates, axis=0), graph("Unsqueeze", places, [1]))
+    squares = graph("ReduceSum", graph("Mul", away, away), [-1], keepdims=0)
+    nearest = graph("ArgMin", squares, axis=1, keepdims=1)
+    pointer = graph("Squeeze", graph("GatherElements", candidates, nearest, axis=1), [1])
+    stood = graph("Add", memory["stalled"], 1)
+    return pointer, graph("Where", graph("Greater", pointer, memory["pointer"]), np.array(0), stood)
+
+
+def _ahead(graph: Graph, line: str, places: str, pointer: str, distances: Any) -> str:
+    """Return points of a line ahead, relative to places [B, K, 2]."""
+    at = graph("Min", graph("Add", graph("Unsqueeze", pointer, [1]), np.atleast_1d(distances)), _last(graph, line))
+    return graph("Sub", graph("Gather", line, at, axis=0), graph("Unsqueeze", places, [1]))
+
+
+def _share(graph: Graph, data: ControllerData, stalled: str) -> str:
+    waited = graph("Div", graph.cast(stalled, np.float64), float(data.words["patience"]))
+    return graph("Unsqueeze", graph("Min", waited, 1.0), [1])
+
+
+def _robot(graph: Graph, data: ControllerData, seen: str, memory: dict[str, str], line: str) -> Step:
+    words, arrays = data
+    places = graph.columns(seen, arrays["entries"])
+    pointer, stalled = _advanced(graph, data, places, memory, line)
+    side = _leading(graph, data, seen, graph("Squeeze", _ahead(graph, line, places, pointer, arrays["half"]), [1]),
+                    memory["side"])
+    matrix = graph("Gather", arrays["side_observations"], side, axis=0)
+    own = graph("Squeeze", graph("MatMul", matrix, graph("Unsqueeze", seen, [2])), [2])
+    c, s = _heading(graph, words["speeds"], own)
+    ahead = _ahead(graph, line, places, pointer, arrays["distances"])
+    x, y = graph.columns(ahead, [0]), graph.columns(ahead, [1])
+    forward, left = _rotated(graph, x, y, graph("Unsqueeze", c, [1]), graph("Neg", graph("Unsqueeze", s, [1])))
+    view = graph("Flatten", graph("Concat", forward, left, axis=-1))
+    kept = np.delete(np.arange(len(words["observation"])), arrays["entries"])
+    body = graph("Concat", *_turned(graph, words["speeds"], own, kept, c, graph("Neg", s)), axis=-1)
+    normal = graph("Div", graph("Sub", body, arrays["origin"]), arrays["scale"])
+    inputs = graph("Concat", normal, view, _share(graph, data, stalled), axis=-1)
+    bounded = graph("Min", graph("Max", inputs, -deploy.LARGEST), deploy.LARGEST)
+    return bounded, graph("Mul", side, 0), {"pointer": pointer, "stalled": stalled, "side": side}
+
+
+def _leading(graph: Graph, data: ControllerData, seen: str, far: str, before: str) -> str:
+    """Return which side of a robot looks along the line [B], given the point half-way ahead [B, 2]."""
+    sides = data.arrays["side_observations"]
+    if len(sides) == 1:
+        return graph("Mul", before, 0)
+    x, y = _unit(graph, graph.columns(far, [0]), graph.columns(far, [1]))
+    cosines = []
+    for one in sides:
+        c, s = _heading(graph, data.words["speeds"], graph("MatMul", seen, one.T))
+        cosines.append(graph("Add", graph("Mul", c, x), graph("Mul", s, y)))
+    along = graph("Concat", *cosines, axis=-1)
+    known = graph("Unsqueeze", graph("Max", before, 0), [1])
+    kept = graph("And", graph("GreaterOrEqual", graph("GatherElements", along, known, axis=1), deploy.KEEP_SIDE),
+                 graph("GreaterOrEqual", graph("Unsqueeze", before, [1]), 0))
+    best = graph("ArgMax", along, axis=1, keepdims=1)
+    return graph("Squeeze", graph("Where", kept, graph("Unsqueeze", before, [1]), best), [1])
+
+
+def _heading(graph: Graph, speeds: int, seen: str) -> tuple[str, str]:
+    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.FreeJoint` and `deploy.Fixed`."""
+    if not speeds:
+        zero = graph("Mul", graph.columns(seen, [0]), 0.0)
+        return graph("Add", zero, 1.0), zero
+    w, x, y, z = (graph.columns(seen, [entry]) for entry in range(3, 7))
+    ahead = graph("Sub", graph("Add", graph("Mul", w, w), graph("Mul", x, x)),
+                  graph("Add", graph("Mul", y, y), graph("Mul", z, z)))
+    return _unit(graph, ahead, graph("Mul", graph("Add", graph("Mul", w, z), graph("Mul", x, y)), 2.0))
+
+
+def _unit(graph: Graph, x: str, y: str) -> tuple[str, str]:
+    """Return cosine and sine of the directions of vectors; those of the x axis for a vector of no length."""
+    length = graph("Sqrt", graph("Add", graph("Mul", x, x), graph("Mul", y, y)))
+    none = graph("Equal", length, 0.0)
+    safe = graph("Where", none, 1.0, length)
+    return graph("Where", none, 1.0, graph("Div", x, safe)), graph("Div", y, safe)
+
+
+def _rotated(graph: Graph, x: str, y: str, c: str, s: str) -> tuple[str, str]:
+    """Return vectors turned by an angle of cosine c and sine s."""
+    return (graph("Sub", graph("Mul", c, x), graph("Mul", s, y)), graph("Add", graph("Mul", s, x), graph("Mul", c, y)))
+
+
+def _turned(graph: Graph, speeds: int, seen: str, kept: Any, c: str, s: str) -> list[str]:
+    """Return some entries of observations in a turned world, each [B, 1]; see `deploy.FreeJoint.turned`."""
+    if not speeds:
+        return [graph.columns(seen, kept)]
+    larger = graph("Sqrt", graph("Div", graph("Add", graph("Abs", c), 1.0), 2.0))
+    smaller = graph("Div", graph("Abs", s), graph("Mul", larger, 2.0))
+    ahead = graph("GreaterOrEqual", c, 0.0)
+    sign = graph("Where", graph("Less", s, 0.0), -1.0, 1.0)
+    h = graph("Where", ahead, larger, smaller)
+    k = graph("Mul", sign, graph("Where", ahead, smaller, larger))
+    w, x, y, z = (graph.columns(seen, [entry]) for entry in range(3, 7))
+    first, last = _rotated(graph, w, z, h, k)
+    second, third = _rotated(graph, x, y, h, k)
+    flip = graph("Where", graph("Less", first, 0.0), -1.0, 1.0)
+    quaternion = [graph("Mul", part, flip) for part in (first, second, third, last)]
+    speed = _rotated(graph, graph.columns(seen, [speeds]), graph.columns(seen, [speeds + 1]), c, s)
+    changed = {**dict(zip(range(3, 7), quaternion, strict=True)), speeds: speed[0], speeds + 1: speed[1]}
+    return [changed.get(entry) or graph.columns(seen, [entry]) for entry in kept.tolist()]
