@@ -29,13 +29,13 @@ RULES = ("goal", "feature", "max_episode_steps")
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
-    """One run for each seed, task and method, seed by seed, so that a part is balanced."""
-    common = {key: sweep[key] for key in ("noise", "planner", "plan_transitions")}
+    """One run for each method, seed and task: method by method, since the first ones are the cheapest."""
+    common, most = {key: sweep[key] for key in ("noise", "planner", "plan_transitions")}, "max_transitions"
     return [{"name": f"{task}-{method}-{index}", "task": task, "method": method, "index": index,
-             "seed": sweep["first_seed"] + index, "episodes": budget["episodes"], **common, **options}
-            for index in range(seeds) for task, options in sweep["tasks"].items()
-            for method, budget in sweep["methods"].items()
-            if index < budget["seeds"] and method not in options.get("without", ())]
+             "seed": sweep["first_seed"] + index, "episodes": budget["episodes"], **common, **options,
+             most: min(options[most], budget.get(most, options[most]))}
+            for method, budget in sweep["methods"].items() for index in range(min(seeds, budget["seeds"]))
+            for task, options in sweep["tasks"].items() if method not in options.get("without", ())]
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
