@@ -5,7 +5,7 @@ layers are views of it. A loss takes a `Weights`, which is called as a function 
 each network of the stack.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from torch import Tensor
 from pbcs_ompl.agents.initialisation import INITIALISATIONS, draw_layer, layer_shapes
 from pbcs_ompl.agents.kernels.network import BETA_1, BETA_2
 from pbcs_ompl.agents.policy import LAYER_NORM_EPSILON
+from pbcs_ompl.core.errors import Mismatch
 
 ADAM_EPSILON = 1e-8
 """Of Adam (Kingma and Ba, 2015), as are the two decay rates of its moments."""
@@ -275,3 +276,29 @@ def adam_rates(learning_rate: float, numbers: Iterable[int], device: torch.devic
     correction = np.sqrt(1.0 - BETA_2**steps)
     rates = np.stack([learning_rate * correction / (1.0 - BETA_1**steps), ADAM_EPSILON * correction], axis=1)
     return torch.from_numpy(rates.astype(np.float32)).to(device)
+
+
+def load_tensors(tensors: Mapping[str, Tensor], state: Mapping[str, np.ndarray], others: Sequence[str],
+                 seeds: Sequence[int]) -> None:
+    """Fill the tensors of a stack of agents from what was saved of it; nothing is changed where it does not fit.
+
+    Args:
+        tensors: By name.
+        state: What was saved, by name.
+        others: What else must have been saved, beside the seeds.
+        seeds: Those of the stack.
+
+    Raises:
+        Mismatch: something is missing, or of other networks or seeds.
+    """
+    missing = {*tensors, *others, "seeds"} - set(state)
+    if missing:
+        raise Mismatch(f"this is not the state of such an agent: {sorted(missing)[0]} is missing")
+    if tuple(np.ravel(state["seeds"])) != tuple(seeds):
+        raise Mismatch(f"state of the seeds {np.ravel(state['seeds'])}, expected {tuple(seeds)}")
+    for name, tensor in tensors.items():
+        if np.shape(state[name]) != tuple(tensor.shape):
+            raise Mismatch(f"{name} has the shape {np.shape(state[name])}, expected {tuple(tensor.shape)}; the state "
+                           "is of an agent with other settings")
+    for name, tensor in tensors.items():
+        tensor.copy_(torch.from_numpy(np.ascontiguousarray(state[name])))

@@ -77,6 +77,18 @@ class Policy:
         weight, bias = self.layers[-1]
         return values @ weight + bias
 
+    def blended(self, other: "Policy", share: float) -> "Policy":
+        """Return the policy of the same sizes with the parameters (1 - share) p + share q.
+
+        Args:
+            other: The policy of q.
+            share: Within [0, 1].
+        """
+        layers = tuple(tuple(np.asarray((1.0 - share) * mine + share * its, dtype=np.float32)
+                             for mine, its in zip(*pair, strict=True))
+                       for pair in zip(self.layers, other.layers, strict=True))
+        return Policy(layers, self.action_low, self.action_high)
+
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Return the policy as named arrays: low, high, weight_0, bias_0 (gain_0, shift_0), weight_1, ..."""
         arrays: dict[str, np.ndarray] = {"low": self.action_low.copy(), "high": self.action_high.copy()}

@@ -21,14 +21,14 @@ from torch import Tensor
 
 from pbcs_ompl.agents import losses
 from pbcs_ompl.agents.kernels.counter_rng import normal, stream_keys
-from pbcs_ompl.agents.networks import MLP, TrainedNetwork, TrainedScalar, adam_rates
+from pbcs_ompl.agents.networks import MLP, TrainedNetwork, TrainedScalar, adam_rates, load_tensors
 from pbcs_ompl.agents.policy import Policy, to_box
 from pbcs_ompl.agents.rollout import Rollout, advantages
-from pbcs_ompl.agents.settings import DEEPEST, LARGEST, WIDEST
+from pbcs_ompl.agents.settings import LARGEST, check_types_and_widths
 from pbcs_ompl.agents.stacked_agent import NonFiniteData, action_box, policy_of
 from pbcs_ompl.agents.update import choose_device, quick_arithmetic
-from pbcs_ompl.core.errors import InvalidOption, Mismatch
-from pbcs_ompl.core.options import check_names, check_range, check_types
+from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.core.options import check_names, check_range
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Array
 
@@ -78,13 +78,7 @@ class PPOSettings:
     smallest_std: float = 0.1
 
     def __post_init__(self) -> None:
-        if isinstance(self.hidden, list):
-            object.__setattr__(self, "hidden", tuple(self.hidden))
-        types = {field.name: type(field.default) for field in fields(self)}
-        check_types({name: getattr(self, name) for name in types}, types)
-        widths = [isinstance(width, int) and 0 < width <= WIDEST for width in self.hidden]
-        check_range("hidden", self.hidden, 0 < len(widths) <= DEEPEST and all(widths),
-                    f"at most {DEEPEST} whole numbers from 1 to {WIDEST}")
+        check_types_and_widths(self)
         for name in ("learning_rate", "smallest_learning_rate", "largest_learning_rate", "kl_target", "clip"):
             check_range(name, getattr(self, name), 0.0 < getattr(self, name) < inf, "a positive number")
         for name in ("epochs", "batch_size"):
@@ -316,18 +310,7 @@ class PPO:
         Raises:
             Mismatch: the state is of another algorithm, other networks or other seeds.
         """
-        tensors = self._tensors()
-        missing = {*tensors, "learning_rates", "counts", "seeds"} - set(state)
-        if missing:
-            raise Mismatch(f"this is not the state of a PPO agent: {sorted(missing)[0]} is missing")
-        if tuple(np.ravel(state["seeds"])) != self.seeds:
-            raise Mismatch(f"state of the seeds {np.ravel(state['seeds'])}, expected {self.seeds}")
-        for name, tensor in tensors.items():
-            if np.shape(state[name]) != tuple(tensor.shape):
-                raise Mismatch(f"{name} has the shape {np.shape(state[name])}, expected {tuple(tensor.shape)}; the "
-                               "state is of an agent with other settings")
-        for name, tensor in tensors.items():
-            tensor.copy_(torch.from_numpy(np.ascontiguousarray(state[name])))
+        load_tensors(self._tensors(), state, ("learning_rates", "counts"), self.seeds)
         self.learning_rates = np.array(state["learning_rates"], dtype=np.float64)
         self.num_updates, self.num_iterations, self._num_samples = (int(count) for count in state["counts"])
 

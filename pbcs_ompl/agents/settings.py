@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from importlib.resources import files
 from math import inf
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Protocol, Self
 
 from pbcs_ompl.agents.initialisation import INITIALISATIONS
 from pbcs_ompl.core.errors import InvalidOption, UnknownName
@@ -41,6 +41,32 @@ INPUTS = ("plain", "baselines")
 """See `inputs.py`."""
 DEEPEST, WIDEST, LARGEST = 64, 16_384, 1_000_000_000
 """Of the layers of a network, and of a mini-batch or replay buffer: what is larger fits no machine."""
+
+
+class WithNetworks(Protocol):
+    """Settings of an agent with networks, a dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def hidden(self) -> tuple[int, ...]:
+        """Widths of the hidden layers."""
+        ...
+
+
+def check_types_and_widths(settings: WithNetworks) -> None:
+    """Check the types of settings against their defaults, and the widths of networks, which may be given as a list.
+
+    Raises:
+        InvalidOption: a value of the wrong type, or widths out of their range.
+    """
+    if isinstance(settings.hidden, list):
+        object.__setattr__(settings, "hidden", tuple(settings.hidden))
+    types = {field.name: type(field.default) for field in fields(settings)}
+    check_types({name: getattr(settings, name) for name in types}, types)
+    widths = [isinstance(width, int) and 0 < width <= WIDEST for width in settings.hidden]
+    check_range("hidden", settings.hidden, 0 < len(widths) <= DEEPEST and all(widths),
+                f"at most {DEEPEST} whole numbers from 1 to {WIDEST}")
 
 
 @dataclass(frozen=True)
@@ -77,13 +103,7 @@ class AgentSettings:
     inputs: str = "plain"
 
     def __post_init__(self) -> None:
-        if isinstance(self.hidden, list):
-            object.__setattr__(self, "hidden", tuple(self.hidden))
-        types = {field.name: type(field.default) for field in fields(self)}
-        check_types({name: getattr(self, name) for name in types}, types)
-        widths = [isinstance(width, int) and 0 < width <= WIDEST for width in self.hidden]
-        check_range("hidden", self.hidden, 0 < len(widths) <= DEEPEST and all(widths),
-                    f"at most {DEEPEST} whole numbers from 1 to {WIDEST}")
+        check_types_and_widths(self)
         for name in ("actor_learning_rate", "critic_learning_rate"):
             check_range(name, getattr(self, name), 0.0 < getattr(self, name) < inf, "a positive number")
         for name in ("batch_size", "replay_capacity"):

@@ -27,7 +27,7 @@ from torch import Tensor
 from pbcs_ompl.agents.inputs import INPUT_KINDS, PlainInputs
 from pbcs_ompl.agents.kernels.counter_rng import stream_keys
 from pbcs_ompl.agents.losses import ActionBox, td_targets
-from pbcs_ompl.agents.networks import MLP, Loss, TrainedNetwork, TrainedScalar, adam_rates
+from pbcs_ompl.agents.networks import MLP, Loss, TrainedNetwork, TrainedScalar, adam_rates, load_tensors
 from pbcs_ompl.agents.policy import Policy, to_box
 from pbcs_ompl.agents.replay import Batch, Replay
 from pbcs_ompl.agents.settings import AgentSettings
@@ -301,20 +301,11 @@ class StackedAgent(ABC):
         Raises:
             Mismatch: the state is of another algorithm, other networks or other seeds.
         """
-        tensors = self.tensors()
         replay = {key.removeprefix("replay/"): state[key] for key in state if key.startswith("replay/")}
         inputs = {key.removeprefix("inputs/"): state[key] for key in state if key.startswith("inputs/")}
-        same_inputs = set(inputs) == set(self.inputs.state_dict(range(len(self.seeds))))
-        if not ({*tensors, "seeds", "num_updates"} <= set(state) and self.replay.can_load(replay) and same_inputs):
-            raise Mismatch("this is not the state of such an agent: networks or transitions are missing")
-        if tuple(np.ravel(state["seeds"])) != self.seeds:
-            raise Mismatch(f"state of the seeds {np.ravel(state['seeds'])}, expected {self.seeds}")
-        for name, tensor in tensors.items():
-            if np.shape(state[name]) != tuple(tensor.shape):
-                raise Mismatch(f"{name} has {np.size(state[name])} values, expected {tensor.numel()}; "
-                               "the state is of an agent with other settings")
-        for name, tensor in tensors.items():
-            tensor.copy_(torch.from_numpy(np.ascontiguousarray(state[name])))
+        if not (self.replay.can_load(replay) and set(inputs) == set(self.inputs.state_dict(range(len(self.seeds))))):
+            raise Mismatch("this is not the state of such an agent: transitions are missing")
+        load_tensors(self.tensors(), state, ("num_updates",), self.seeds)
         self.replay.load_state_dict(replay)
         self.inputs.load_state_dict(inputs)
         self.num_updates = int(state["num_updates"])

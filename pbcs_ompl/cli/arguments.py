@@ -210,6 +210,8 @@ def _study(verb: Parser) -> None:
     verb.add_argument("id", nargs="?", metavar="ID", help="a study of --list, or the folder of one")
     verb.add_argument("--list", action="store_true", help="list the studies and what they are about")
     verb.add_argument("--seeds", type=integer(1), metavar="N", help="how many seeds (as the study says)")
+    verb.add_argument("--from-records", action="store_true",
+                      help="make no run: draw the figures from the records that come with the study")
     verb.add_argument("--device", metavar="NAME", help="where agents learn: cpu or cuda (as the study says)")
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="kill a run that takes longer")
     verb.add_argument("--max-memory", type=integer(1), metavar="MB", help="kill a run whose process holds more")

@@ -19,7 +19,7 @@ from pbcs_ompl.experiments.workers.schedulers import makefile, slurm_script
 from pbcs_ompl.results.command_line import command, report_words, shell, study_words
 from pbcs_ompl.results.files import write_text
 
-VERDICTS = {True: "agrees", False: "DIFFERS", None: "no data"}
+VERDICTS = {True: "agrees", False: "DIFFERS", None: "not enough runs"}
 
 
 def run(arguments: Namespace) -> int:
@@ -34,6 +34,8 @@ def run(arguments: Namespace) -> int:
         raise InvalidOption("the id of a study is missing; pbcs study --list shows them all")
     if arguments.shard is not None and (arguments.emit or not arguments.out):
         raise InvalidOption("--shard makes runs in the --out that all shards share: add --out, leave out --emit")
+    if arguments.from_records and (arguments.emit or arguments.shard is not None or arguments.seeds is not None):
+        raise InvalidOption("--from-records makes no runs: leave out --emit, --shard and --seeds")
     study = find_study(arguments.id)
     study = study if arguments.device is None else study.on_device(arguments.device)
     arguments.seeds = study.seeds if arguments.seeds is None else arguments.seeds
@@ -55,7 +57,7 @@ def _make(study: Study, arguments: Namespace, out: Path) -> int:
         options = {"out": out, "seeds": arguments.seeds, "jobs": jobs, "max_seconds": arguments.max_seconds,
                    "max_memory": arguments.max_memory, "on_progress": display}
         if shard is None:
-            summary = run_study(study, **options).summary()
+            summary = run_study(study, from_records=arguments.from_records, **options).summary()
             lines = _closing_lines(study.title, summary, out)
         else:
             records, failures = run_shard(study, shard, **options)

@@ -11,10 +11,12 @@ from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.types import ProgressCallback
 from pbcs_ompl.experiments.claims import Claim
-from pbcs_ompl.experiments.records import Results, make_missing_runs, read_records
+from pbcs_ompl.experiments.records import Results, make_missing_runs, read_records, record_file
 from pbcs_ompl.experiments.run import Failure, Record, Run, Shard
+from pbcs_ompl.experiments.shipped_records import shipped_records
 from pbcs_ompl.experiments.study import STUDIES, Study, find_study
 from pbcs_ompl.experiments.workers import Executor, Limits, make_executor
+from pbcs_ompl.results.checksums import write_summed_json
 from pbcs_ompl.results.files import FIGURES
 from pbcs_ompl.results.folder import RunFolder, open_run
 
@@ -62,7 +64,7 @@ class StudyRun:
 
 @checked
 def run_study(study: Study | str | Path, *, out: str | Path, seeds: int | None = None, jobs: int | Executor = 1,
-              max_seconds: float | None = None, max_memory: float | None = None,
+              max_seconds: float | None = None, max_memory: float | None = None, from_records: bool = False,
               on_progress: ProgressCallback | None = None) -> StudyResult:
     """Make the runs of a study that were not made yet, and analyse all of them.
 
@@ -77,19 +79,26 @@ def run_study(study: Study | str | Path, *, out: str | Path, seeds: int | None =
             `experiments.workers.ray.ray_cluster`.
         max_seconds: Wall time of one run, which is killed when it takes longer; None for any.
         max_memory: MB that the process of one run may hold before it is killed; None for any.
+        from_records: Make no run: take the records that come with the study, and their number of seeds.
         on_progress: Called with {"runs", "failed"} when a run ends.
 
     Raises:
         UnknownName: there is no such study.
-        InvalidOption: fewer than one seed or job, a limit that is not positive.
+        InvalidOption: fewer than one seed or job, a limit that is not positive, a study that comes without records.
         RunFolderError: `out` holds something else, is in use, or cannot be written.
         DamagedFile: a record in `out` is damaged.
         PbcsError: two runs of one name, or all runs failed.
     """
     chosen, executor, limits = _study(study), make_executor(jobs), Limits(max_seconds, max_memory)
+    shipped: dict[str, Record] = {}
+    if from_records:
+        seeds, shipped = shipped_records(chosen)
     runs = chosen.all_runs(seeds)
     with open_study(chosen, out, seeds) as folder:
-        records, failures = _make(chosen, runs, folder.path, executor, limits, on_progress)
+        for name, record in shipped.items():
+            write_summed_json(record_file(folder.path, name), record)
+        made = [run for run in runs if run.name in shipped] if from_records else runs
+        records, failures = _make(chosen, made, folder.path, executor, limits, on_progress)
         failed = {name: failure.reason for name, failure in failures.items()}
         if not records:
             name, reason = next(iter(failed.items()))

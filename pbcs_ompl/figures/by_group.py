@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pbcs_ompl.core.statistics import wilson
-from pbcs_ompl.figures.canvas import new_figure
+from pbcs_ompl.core.statistics import median_interval, wilson
+from pbcs_ompl.figures.canvas import colour, new_figure
 
 
 def rates_figure(rates: Mapping[str, Mapping[str, tuple[int, int]]], *, title: str = "", xlabel: str = "",
@@ -34,7 +34,7 @@ def rates_figure(rates: Mapping[str, Mapping[str, tuple[int, int]]], *, title: s
 
 def values_figure(values: Mapping[str, Mapping[str, Sequence[float]]], *, title: str = "", xlabel: str = "",
                   ylabel: str = "", log: bool = False) -> Figure:
-    """Draw the value of each run as a dot, and medians as bars.
+    """Draw the value of each run as a dot, and medians as bars with their 95 % bootstrap intervals.
 
     Args:
         values: For each series the values of each group.
@@ -47,13 +47,15 @@ def values_figure(values: Mapping[str, Mapping[str, Sequence[float]]], *, title:
         if not filled:
             continue
         for at, column in filled.items():
-            axes.plot(np.full(len(column), at), column, ".", color=f"C{index}", alpha=0.45)
-        axes.plot(list(filled), [np.median(column) for column in filled.values()], "_", color=f"C{index}",
-                  markersize=16, markeredgewidth=2.5,
+            axes.plot(np.full(len(column), at), column, ".", color=colour(index), alpha=0.35)
+        axes.vlines(list(filled), *np.transpose([median_interval(column) for column in filled.values()]),
+                    color=colour(index), linewidth=1.4)
+        axes.plot(list(filled), [np.median(column) for column in filled.values()], "_", color=colour(index),
+                  markersize=14, markeredgewidth=2.5,
                   label=f"{name} (N = {_range([len(column) for column in filled.values()])})")
     if log:
         axes.set_yscale("log")
-    _finish(figure, axes, title, xlabel, f"{ylabel} (bars: medians)")
+    _finish(figure, axes, title, xlabel, f"{ylabel} (bars: medians, 95 % bootstrap)")
     return figure
 
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from pbcs_ompl.core.errors import Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.figures.canvas import RED
+from pbcs_ompl.figures.canvas import QUANTITIES, RED
 from pbcs_ompl.figures.maze import draw_line, legend_below, map_axes
 
 FIELD, ARROWS = 120, 18
@@ -17,7 +17,7 @@ FIELD, ARROWS = 120, 18
 def critic_figure(model: ResettableModel, policy: Callable[[Array], Array],
                   critic: Callable[[Array, Array], Array], *, rollout: Array | None = None,
                   title: str = "") -> Figure:
-    """Draw Q(s, pi(s)) as a green field, pi(s) as black arrows and one rollout [T+1, D] in red.
+    """Draw Q(s, pi(s)) as a field, pi(s) as white arrows and one rollout [T+1, D] in red.
 
     Args:
         policy: pi, from observations [B, O] to actions [B, A]; the first two action dimensions are drawn.
@@ -33,13 +33,13 @@ def critic_figure(model: ResettableModel, policy: Callable[[Array], Array],
     states, extent = _grid(model, FIELD)
     observations = model.observe(states)
     values = critic(observations, policy(observations)).reshape(FIELD, FIELD)
-    field = axes.imshow(values, origin="lower", extent=extent, cmap="Greens", zorder=0,
+    field = axes.imshow(values, origin="lower", extent=extent, cmap=QUANTITIES, zorder=0,
                         interpolation="bilinear")
     figure.colorbar(field, ax=axes, shrink=0.7, pad=0.02, label="Q(s, π(s))")
     states, _ = _grid(model, ARROWS)
     free = states[model.is_valid(states)]
     actions = policy(model.observe(free))
-    axes.quiver(free[:, 0], free[:, 1], actions[:, 0], actions[:, 1], color="black", width=0.003, zorder=3)
+    axes.quiver(free[:, 0], free[:, 1], actions[:, 0], actions[:, 1], color="white", width=0.003, zorder=3)
     if rollout is not None:
         draw_line(axes, rollout[:, :2], color=RED, linewidth=1.6, zorder=4,
                   label=f"rollout, {len(rollout) - 1} steps")

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.figures.canvas import RED, new_figure
+from pbcs_ompl.figures.canvas import BAND, QUANTITIES, RED, new_figure, new_panels
 
 
 def success_figure(curves: Mapping[str, tuple[IndexArray, BoolArray]], *, title: str = "",
@@ -23,22 +23,21 @@ def success_figure(curves: Mapping[str, tuple[IndexArray, BoolArray]], *, title:
         seeds = success.shape[1]
         low, high = np.transpose([wilson(int(count), seeds) for count in success.sum(axis=1)])
         (line,) = axes.plot(steps, success.mean(axis=1), linewidth=2, label=f"{name} (N = {seeds})")
-        axes.fill_between(steps, low, high, color=line.get_color(), alpha=0.15, linewidth=0)
+        axes.fill_between(steps, low, high, color=line.get_color(), alpha=BAND, linewidth=0)
     axes.set_ylim(-0.02, 1.02)
     axes.set_xlabel(xlabel)
-    axes.set_ylabel("share of solved seeds")
+    axes.set_ylabel("share of solved seeds (95 % Wilson)")
     axes.set_title(title, fontsize=10)
     axes.grid(alpha=0.3)
-    figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
+    if curves:
+        figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
     return figure
 
 
 def curves_figure(steps: Array, panels: Mapping[str, Array], *, title: str = "", xlabel: str = "updates") -> Figure:
     """Draw one panel for each quantity [E, S], one line for each seed ([Matheron2020] Fig. 6.4)."""
-    figure, first = new_figure(4.2 * len(panels), 3.8)
-    first.remove()
-    for index, (name, values) in enumerate(panels.items()):
-        axes = figure.add_subplot(1, len(panels), index + 1)
+    figure, grid = new_panels(1, len(panels), 4.2 * len(panels), 3.8)
+    for axes, (name, values) in zip(grid, panels.items(), strict=True):
         axes.plot(steps, values, linewidth=1)
         axes.set_xlabel(xlabel)
         axes.set_title(f"{name} (N = {values.shape[1]})", fontsize=10)
@@ -78,7 +77,7 @@ def critic_map_figure(states: Array, actions: Array, values: Array, chosen: Arra
         chosen: The actor's actions [N].
     """
     figure, axes = new_figure(6.4, 4.6)
-    mesh = axes.pcolormesh(states, actions, values.T, shading="nearest", cmap="viridis")
+    mesh = axes.pcolormesh(states, actions, values.T, shading="nearest", cmap=QUANTITIES)
     figure.colorbar(mesh, ax=axes, label="Q")
     axes.plot(states, chosen, color=RED, linewidth=2, label="actor")
     axes.set_xlabel("state")

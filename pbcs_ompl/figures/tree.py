@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.figures.canvas import RED
+from pbcs_ompl.figures.canvas import QUANTITIES, RED
 from pbcs_ompl.figures.maze import draw_line, legend_below, map_axes, project_2d
 
 MOST_EDGES = 100_000
@@ -29,7 +29,7 @@ def tree_figure(model: ResettableModel, states: Array, parents: NDArray[np.integ
     points = project_2d(model, states)
     depths = depth(parents)[drawn]
     lines = LineCollection(list(np.stack([points[parents[drawn]], points[drawn]], axis=1)), array=depths,
-                           cmap="winter", linewidths=0.7, zorder=1)
+                           cmap=QUANTITIES, linewidths=0.7, zorder=1)
     axes.add_collection(lines)
     if len(drawn):
         figure.colorbar(lines, ax=axes, shrink=0.7, pad=0.02, label="depth in the tree")

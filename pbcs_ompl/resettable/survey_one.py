@@ -14,6 +14,7 @@ from pbcs_ompl.core.errors import MissingDependency, NotResettable, PbcsError, U
 from pbcs_ompl.resettable.adapters.visited import VisitedEnv
 from pbcs_ompl.resettable.check import check_resettable
 from pbcs_ompl.resettable.make import make
+from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes
 from pbcs_ompl.resettable.survey import MEMORY, OUT_OF_MEMORY, Record, nothing
 from pbcs_ompl.results.files import write_json
 
@@ -36,7 +37,9 @@ def _classify(env_id: str) -> Record:
     except (NotResettable, UnsupportedSpace) as error:
         return nothing("refused", str(error))
     except PbcsError as error:
-        return nothing("failed", str(error))
+        if isinstance(error.__cause__, MemoryError):
+            return nothing("failed", OUT_OF_MEMORY)
+        return nothing("not installed" if isinstance(error.__cause__, ImportError) else "failed", str(error))
     except ModuleNotFoundError as error:
         return nothing("not installed", str(error))
     except MemoryError:
@@ -50,7 +53,17 @@ def _classify(env_id: str) -> Record:
              "restore_us": None if wrong else restore_cost(model)}
     if wrong:
         return {"verdict": "failed", "why": f"{wrong[0].name}: {wrong[0].detail}", **found}
-    return {"verdict": "visited only" if visited else "exact", "why": "", **found}
+    if not visited:
+        return {"verdict": "exact", "why": "", **found}
+    return {"verdict": "visited only", "why": randomness(model.env.inner), **found}
+
+
+def randomness(env: Any) -> str:
+    """Return what is to be said of an environment whose steps draw random numbers; nothing of another one."""
+    changes = Changes(env)
+    for event in episodes(env, SEEDS[:1], STATES):
+        changes.add(event)
+    return f"steps draw random numbers from {changes.random}: a plan holds for one seed" if changes.random else ""
 
 
 def restore_cost(model: Any) -> float:

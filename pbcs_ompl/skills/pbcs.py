@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pbcs_ompl.core.options import check_range
+from pbcs_ompl.core.types import IndexArray
 from pbcs_ompl.skills.activation_sets import (
     ActivationSet,
     ClassifierSettings,
@@ -20,10 +21,13 @@ from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.observed_sets import Entry, entry_from_arrays, entry_kinds, entry_to_arrays
 from pbcs_ompl.skills.policy import SkillPolicy, policy_from_arrays, policy_to_arrays
+from pbcs_ompl.skills.sequential_test import SequentialTest
 from pbcs_ompl.skills.settings import PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
 
 ACTIVATIONS = ("ball", "classifier")
+FIRST_TRIALS = 16
+"""Executions of a verification side by side before its test is asked; each time as many again follow."""
 
 
 @dataclass(frozen=True)
@@ -36,24 +40,20 @@ class PBCSSettings(PlannedSettings):
             start around its start ([Matheron2020] 7.2: balls).
         classifier: How it is learnt.
         warm_start: A new skill starts from the networks of the skill before (ours).
-        verify_episodes: Noisy executions of the complete chain, after which PBCS trains its weakest skill again if too
-            few succeed; 0 for none ([Matheron2020]).
-        verified_rate: Success rate that they must reach (ours: well above the 95 of 100 that count as solved. Of 500
-            executions, a chain whose true rate is 0.97 reaches 0.985 in about one case of sixty, and one whose true
-            rate is 0.985 fails 95 of 100 in about one case of 240).
+        verify: Execute the complete chain with random actions until `gate` has an answer; where it refuses, PBCS trains
+            the weakest skill again ([Matheron2020]: no).
+        gate: Of the complete chain.
     """
 
     skill: SkillSettings = field(default_factory=SkillSettings)
     activation: str = "ball"
     classifier: ClassifierSettings = field(default_factory=ClassifierSettings)
     warm_start: bool = False
-    verify_episodes: int = 0
-    verified_rate: float = 0.985
+    verify: bool = False
+    gate: SequentialTest = field(default_factory=SequentialTest)
 
     def _check_ranges(self) -> None:
         check_range("activation", self.activation, self.activation in ACTIVATIONS, f"one of {', '.join(ACTIVATIONS)}")
-        self._check("at least 0", lambda value: value >= 0, "verify_episodes")
-        self._check_fractions("verified_rate")
 
 
 class ChainLink(NamedTuple):
@@ -73,9 +73,9 @@ class PBCS:
     and so on until one starts at waypoint 0.
 
     Source: [Matheron2020] Alg. 6. Differs: the loop ends when a skill starts at index 0 (Alg. 7 never trains index 0,
-    so that Alg. 6 would not end). With `verify_episodes`, the complete chain is executed once without random actions
-    and, if it succeeds, that many times with them; when it does not, or too many executions fail, the skill in which
-    most of them failed is removed and the gap is trained again with new networks.
+    so that Alg. 6 would not end). With `verify`, the complete chain is executed once without random actions and, if it
+    succeeds, with them until a sequential test has an answer; when it refuses, the skill in which most executions
+    failed is removed and the gap is trained again with new networks.
     """
 
     def __init__(self, trainer: SkillTrainer, settings: PBCSSettings):
@@ -83,7 +83,7 @@ class PBCS:
         self.settings = settings
         self.links: list[ChainLink] = []
         """From the start to the goal; with a gap while one is being trained."""
-        self.verified = not settings.verify_episodes
+        self.verified = not settings.verify
         self.metric = trainer.observed_metric()
         self._train_between(0, trainer.waypoints.last)
 
@@ -111,7 +111,12 @@ class PBCS:
     @property
     def standing(self) -> str:
         """How far training has come, in words."""
-        return f"{self.covered:.0%} of the plan covered"
+        covered = f"{self.covered:.0%} of the plan covered"
+        if self.complete:
+            return f"{covered}, but the chain does not pass its verification"
+        state, last = self.backplay.state, self.trainer.waypoints.last
+        return (f"{covered}; of the episodes that begin at {state.start / last:.0%} of it and are to end at "
+                f"{self.end / last:.0%}, {max(0.0, state.best):.0%} succeed in the best session")
 
     @property
     def longest_step(self) -> int:
@@ -165,18 +170,29 @@ class PBCS:
         return sets.get(index, self.trainer.waypoints.target(index))
 
     def _verify(self) -> None:
+        """Test the complete chain; where it is refused, remove the skill in which most executions failed."""
         trainer, settings = self.trainer, self.settings
         chain = SkillChain.of(self.skills, trainer.waypoints, settings.steps_per_skill)
-        starts = np.repeat(trainer.waypoints.states[:1], settings.verify_episodes, axis=0)
-        tried = chain.rollouts(trainer.model, starts[:1], counter=trainer.counter)
-        if tried.success.all():
-            tried = chain.rollouts(trainer.model, starts, epsilon=settings.episodes.epsilon, rng=trainer.rng,
-                                   counter=trainer.counter)
-        self.verified = bool(tried.success.mean() >= settings.verified_rate)
-        if not self.verified:
-            weakest = self.links.pop(int(np.bincount(tried.skills[~tried.success]).argmax()))
+        failures = self._failures(chain, 1, 0.0)
+        verdict = False if len(failures) else None
+        trials = 0
+        while verdict is None:
+            count = min(max(trials, FIRST_TRIALS), settings.gate.most_needed(trials - len(failures), trials))
+            failures = np.concatenate([failures, self._failures(chain, count, settings.episodes.epsilon)])
+            trials += count
+            verdict = settings.gate.verdict(trials - len(failures), trials)
+        self.verified = verdict
+        if not verdict:
+            weakest = self.links.pop(int(np.bincount(failures).argmax()))
             trainer.restart()
             self._train_between(weakest.start, weakest.end)
+
+    def _failures(self, chain: SkillChain, count: int, epsilon: float) -> IndexArray:
+        """Return the skills in which those of `count` executions that fail come to their ends [at most count]."""
+        trainer = self.trainer
+        starts = np.repeat(trainer.waypoints.states[:1], count, axis=0)
+        tried = chain.rollouts(trainer.model, starts, epsilon=epsilon, rng=trainer.rng, counter=trainer.counter)
+        return tried.skills[~tried.success]
 
     def snapshot(self) -> Snapshot:
         """Return everything needed to resume bit for bit."""

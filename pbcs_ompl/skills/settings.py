@@ -121,6 +121,8 @@ class EpisodeSettings(Settings):
         beta: Episodes of a session and of a test ([Matheron2020] Alg. 7 and 8; 50 in chapter 7).
         epsilon: Fraction of random actions while collecting experience ([Matheron2020] chapter 7).
         test_epsilon: Fraction of random actions in tests ([Matheron2020]: 0).
+        first_trials: Episodes of a test that run before the others, which are left out where some of these fail, but
+            not all: only rates of 0 and 1 have a consequence ([Matheron2020]: 0, all run).
         max_steps: Longest episode of a skill, in steps ([Matheron2020] chapter 7); 0 for the environment's limit.
         steps_per_waypoint: Where this number times the waypoints from a start to the target is more than `max_steps`,
             it is the limit instead, up to the environment's (ours; 0 for none).
@@ -133,6 +135,7 @@ class EpisodeSettings(Settings):
     beta: int = 50
     epsilon: float = 0.1
     test_epsilon: float = 0.0
+    first_trials: int = 0
     max_steps: int = 50
     steps_per_waypoint: float = 0.0
     updates_per_transition: float = 1.0
@@ -142,7 +145,8 @@ class EpisodeSettings(Settings):
 
     def _check_ranges(self) -> None:
         self._check_counts("beta", "episodes_per_batch")
-        self._check("at least 0", lambda value: value >= 0, "max_steps", "steps_per_waypoint")
+        self._check("at least 0", lambda value: value >= 0, "max_steps", "steps_per_waypoint",
+                    "first_trials")
         self._check_fractions("epsilon", "test_epsilon")
         self._check_positive("updates_per_transition")
 

@@ -87,11 +87,22 @@ class SkillTrainer:
         return max(settings.max_steps or longest, min(along, longest))
 
     def test(self, index: int) -> float:
-        """Return the success rate of beta episodes from waypoint `index`; of one, where all would be the same."""
+        """Return the success rate of beta episodes from waypoint `index`; of one, where all would be the same.
+
+        It is that of the first `first_trials` of them where that is neither 0 nor 1: the others would not change this.
+        """
         settings = self.settings
-        same = self.waypoints.starts.exact and settings.test_epsilon == 0.0
-        starts = self.waypoints.draw_starts(np.full(1 if same else settings.beta, index), self.rng, self.counter)
-        return self._run(self.act, starts, settings.test_epsilon, self.limit(index)).success_rate
+        count = 1 if self.waypoints.starts.exact and settings.test_epsilon == 0.0 else settings.beta
+        first = min(settings.first_trials or count, count)
+        reached = self._tried(index, first)
+        if first < count and len(np.unique(reached)) == 1:
+            reached = np.concatenate([reached, self._tried(index, count - first)])
+        return float(reached.mean())
+
+    def _tried(self, index: int, count: int) -> BoolArray:
+        """Return which of `count` episodes from waypoint `index` succeed, without training."""
+        starts = self.waypoints.draw_starts(np.full(count, index), self.rng, self.counter)
+        return self._run(self.act, starts, self.settings.test_epsilon, self.limit(index)).reached
 
     def session(self, index: int, rehearsal_fraction: float = 0.0) -> float:
         """Train on beta episodes from waypoint `index`; return their success rate.

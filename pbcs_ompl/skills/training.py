@@ -226,13 +226,19 @@ class Training:
             while not method.done:
                 if not self._step(method):
                     self._checkpoint(method)
-                    return f"the budget of {self.config.max_transitions} transitions is used up, with {method.standing}"
+                    return (f"the budget of {self.config.max_transitions} transitions is used up, with "
+                            f"{method.standing}. {self._advice()}")
                 self._report(method)
                 if stops or time.perf_counter() > self.next_checkpoint:
                     self._checkpoint(method)
                 if stops:
                     raise stops[0]
         return None
+
+    def _advice(self) -> str:
+        """Return what to try when the budget is used up."""
+        other = "pbcs" if self.config.method == "follow" else "follow"
+        return f"Try a larger budget (a folder can be resumed), another seed, another plan, or the method {other!r}"
 
     def _step(self, method: TrainingMethod) -> bool:
         """Make one step of the method; return whether the budget allowed it.

@@ -131,6 +131,32 @@ def test_actions_are_replayed_where_copies_are_not_faithful(kind: type[Slider]) 
     np.testing.assert_array_equal(again.states, states[1:])
 
 
+class Compiled(type):
+    """Classes without a module, as SWIG makes them."""
+
+    @property
+    def __module__(cls) -> str:
+        raise AttributeError("__module__")
+
+
+class Packed(metaclass=Compiled):
+    pass
+
+
+class Engine(Uncopyable):
+    def __init__(self) -> None:
+        self.packed = Packed()
+
+
+def test_objects_of_classes_without_a_module_are_no_hindrance() -> None:
+    gymnasium.register("tests/Engine-v0", Engine)
+    try:
+        report = check_resettable("tests/Engine-v0")
+        assert report.ok, str(report)
+    finally:
+        del gymnasium.registry["tests/Engine-v0"]
+
+
 @pytest.mark.parametrize("kind", [Slider, Uncopyable])
 def test_visited_states_are_within_the_bounds_whatever_the_seed(kind: type[Slider]) -> None:
     model = adapt(kind())

@@ -31,6 +31,12 @@ def test_verdicts(env_id: str, verdict: str, why: str) -> None:
     assert (record["restore_us"] is not None) == (verdict == "exact")
 
 
+def test_randomness_of_steps_is_said() -> None:
+    record = classify("FrozenLake-v1")
+    assert (record["verdict"], record["adapter"]) == ("visited only", "CopiedEnv")
+    assert record["why"] == "steps draw random numbers from np_random: a plan holds for one seed"
+
+
 def test_a_survey_continues_where_it_ended(tmp_path: Path) -> None:
     path = tmp_path / "environments.json"
     seen: list[str] = []
@@ -52,6 +58,22 @@ def test_a_survey_continues_where_it_ended(tmp_path: Path) -> None:
 def test_what_takes_too_long_is_killed_and_said(tmp_path: Path) -> None:
     record, = survey({"pbcs/Box-v0": "pbcs_ompl.envs"}, tmp_path / "found.json", seconds=0.05)
     assert (record["verdict"], record["why"]) == ("failed", "not done after 0.05 s")
+
+
+def test_what_takes_too_much_memory_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "hungry.py").write_text("""
+import gymnasium, numpy as np
+
+class Hungry(gymnasium.Env):
+    def __init__(self):
+        self.much = np.zeros(2**30)
+
+gymnasium.register("Hungry-v0", Hungry)
+""")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=":")
+    monkeypatch.setattr("pbcs_ompl.resettable.survey.package_version", lambda module: module)
+    record, = survey({"Hungry-v0": "hungry"}, tmp_path / "found.json")
+    assert (record["verdict"], record["why"]) == ("failed", "needs more than 6 GiB of memory")
 
 
 def test_the_page_counts_and_quotes() -> None:

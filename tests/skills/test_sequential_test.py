@@ -1,5 +1,7 @@
 """Wald's test: its verdicts, and its error rates by simulation."""
 
+from math import log
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,20 @@ def test_it_ends_with_the_most_trials() -> None:
     test = SequentialTest(refused_rate=0.93, accepted_rate=0.995, most_trials=50)
     assert all(test.verdict(successes, 50) is not None for successes in range(51))
     assert test.verdict(30, 30) is None
+
+
+def test_it_refuses_as_soon_as_successes_alone_would_not_be_accepted() -> None:
+    """It never takes a trial that cannot change the verdict."""
+    test = SequentialTest()
+    for failures in range(4):
+        for successes in range(test.most_trials - failures + 1):
+            trials = successes + failures
+            ahead = [test.verdict(successes + more, trials + more) for more in range(test.most_trials - trials + 1)]
+            if ahead[0] is None:
+                assert True in ahead
+                assert ahead.index(True) == test.most_needed(successes, trials)
+            elif test._ratio(successes, trials) > log(0.05 / 0.95):  # Wald's bound does not refuse
+                assert len(set(ahead)) == 1
 
 
 def test_rates_have_an_order_and_errors_a_range() -> None:

@@ -111,7 +111,7 @@ def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, method, budget):
 def test_a_stop_while_a_link_is_trained_again_resumes_bit_for_bit(tmp_path):
     """An impossible standard of verification keeps the chain open until the budget ends."""
     options = {"env_kwargs": MAZE, "seed": 2, "max_transitions": 150_000,
-               "settings": {"verify_episodes": 20, "epsilon": 0.9, "test_epsilon": 0.0}}
+               "settings": {"verify": True, "epsilon": 0.9, "test_epsilon": 0.0}}
     first = train("pbcs/Maze-v0", **options)
     with pytest.raises(KeyboardInterrupt):
         train("pbcs/Maze-v0", **options, out=tmp_path / "run", on_progress=StopAfter(60))
@@ -136,7 +136,7 @@ def test_a_goal_that_the_planner_does_not_reach_is_the_reason(tmp_path):
 
 
 def test_a_chain_that_misses_the_criterion_says_by_how_much():
-    impossible = {"robust_epsilon": 1.0, "robust_episodes": 20, "verify_episodes": 0}
+    impossible = {"robust_epsilon": 1.0, "robust_episodes": 20, "verify": False}
     result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, settings=impossible)
     assert (result.solved, result.complete, result.robust.episodes) == (False, True, 20)
     assert result.reason == (f"{result.robust.successes} of 20 executions with 100% random actions succeed, "

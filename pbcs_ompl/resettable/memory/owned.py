@@ -157,14 +157,20 @@ def _has_inside(value: Any) -> bool:
     if isinstance(value, list | tuple | deque | dict):
         return True
     kind = type(value)
-    compiled = sys.modules.get(kind.__module__) is None or "__module__" not in vars(kind)
+    compiled = sys.modules.get(_module_of(kind)) is None or "__module__" not in vars(kind)
     return not compiled and (hasattr(value, "__dict__") or any("__slots__" in vars(base) for base in kind.__mro__))
 
 
 def _is_foreign(value: Any) -> bool:
     """Return whether a value is a function, or an object of a library that is no environment."""
-    if isinstance(value, FUNCTIONS) or type(value).__module__.startswith(SIMULATION):
+    module = _module_of(type(value))
+    if isinstance(value, FUNCTIONS) or module.startswith(SIMULATION):
         return True
     if isinstance(value, gymnasium.Env) or type(value).__name__ == "MjData":
         return False
-    return type(value).__module__.partition(".")[0] in LIBRARIES
+    return module.partition(".")[0] in LIBRARIES
+
+
+def _module_of(kind: type) -> str:
+    """Return the name of a class's module; those that SWIG compiles may have none."""
+    return str(getattr(kind, "__module__", ""))

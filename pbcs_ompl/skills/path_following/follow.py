@@ -17,8 +17,8 @@ from pbcs_ompl.skills.sequential_test import SequentialTest
 from pbcs_ompl.skills.settings import AgentSpaces, PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
 
-TRIALS_AT_ONCE = 10
-"""Noisy executions of a test side by side; the sequential test is asked after each such batch."""
+FIRST_TRIALS = 4
+"""Noisy executions of a test before the sequential test is asked; each time as many again follow."""
 SHORTEST_SESSION = 250
 """Transitions of a session along a short line."""
 
@@ -34,27 +34,37 @@ class FollowSettings(PlannedSettings):
         line: The plan as a line, and how policies see it.
         gate: When a policy passes.
         progress_reward: For the progress of a step (ours: with 1, the actor saturates and fewer mazes are solved).
-        effort_cost: For the largest action (ours: without it, actions saturate; 0.3 solves more mazes than 0.15).
+        effort_cost: For the largest action (ours: without it, actions saturate; with 0.3, mazes take a tenth fewer
+            transitions than with 0.1, but where large actions are needed all the time, effort costs what progress is
+            worth).
         action_noise: Deviation of the noise on actions in training, actions in [-1, 1] (ours; 0.3 to 0.5 were equal).
         start_fraction: Fraction of episodes that begin in the plan's first state, not anywhere on it (ours, not tuned).
+        retry_fraction: Fraction of them that begin where executions of the last refused test came to a stop (ours).
         session_lengths: Transitions of a session between two tests, in hops of the plan without its loops (ours: a test
             without noise costs about a tenth).
+        test_share: Transitions of a session, at least, for each of the test before it (ours: a test that refuses a
+            good policy is dear).
+        averaging: Fraction of the averaged policy that stays after an update of the agent; it is the average that is
+            tested and kept (ours: that of the agent's target networks; with 0, the last policy, tests fail more often).
         attempts: Tests that a policy may fail before the line is split (ours; 6 and 10 were equal in mazes).
     """
 
     line: LineSettings = field(default_factory=LineSettings)
     gate: SequentialTest = field(default_factory=SequentialTest)
     progress_reward: float = 0.3
-    effort_cost: float = 0.3
+    effort_cost: float = 0.1
     action_noise: float = 0.3
     start_fraction: float = 0.1
+    retry_fraction: float = 0.3
     session_lengths: int = 10
+    test_share: float = 0.5
+    averaging: float = 0.995
     attempts: int = 6
 
     def _check_ranges(self) -> None:
         self._check_positive("progress_reward")
-        self._check("at least 0", lambda value: value >= 0, "effort_cost", "action_noise")
-        self._check_fractions("start_fraction")
+        self._check("at least 0", lambda value: value >= 0, "effort_cost", "action_noise", "test_share")
+        self._check_fractions("start_fraction", "retry_fraction", "averaging")
         self._check_counts("session_lengths", "attempts")
 
     def agent_spaces(self, model: ResettableModel) -> AgentSpaces:
@@ -86,6 +96,7 @@ class FollowState:
         end: The pointer at which the present policy ends; beyond the line, it ends at the environment's goal.
         phase: What comes next: "train", "test" or "split".
         tests: Tests that the present policy has failed.
+        tested: Transitions of the last of them.
         best_rate, best_blocked: Those of its best test so far.
         candidate: The pointer from which the best policy is tried next, in a split.
         passed: Whether the policies lead from the start to the goal.
@@ -94,6 +105,7 @@ class FollowState:
     end: int
     phase: str = "train"
     tests: int = 0
+    tested: int = 0
     best_rate: float = -1.0
     best_blocked: int = 0
     candidate: int = 0
@@ -126,6 +138,8 @@ class Follow:
         """Train a policy from the start to the pointer `end` from now on."""
         self.state = FollowState(end)
         self.best = None
+        self._retries: Position | None = None
+        self._average = self._present()
         self._position = self._fresh(self.trainer.settings.episodes_per_batch)
         self._steps = np.zeros(len(self._position.states), dtype=np.int64)
 
@@ -156,11 +170,12 @@ class Follow:
     @property
     def longest_step(self) -> int:
         """The most transitions that a step may take."""
-        return max(self._session_transitions, (self.settings.gate.most_trials + TRIALS_AT_ONCE + 1) * self._max_steps)
+        return max(self._session_transitions, (self.settings.gate.most_trials + 1) * self._max_steps)
 
     @property
     def _session_transitions(self) -> int:
-        return max(SHORTEST_SESSION, self.settings.session_lengths * self.task.hops)
+        return max(SHORTEST_SESSION, self.settings.session_lengths * self.task.hops,
+                   round(self.settings.test_share * self.state.tested))
 
     @property
     def _max_steps(self) -> int:
@@ -173,7 +188,7 @@ class Follow:
         Args:
             steps_per_skill: Shortest time limit of an execution.
         """
-        first = [] if self.done else [Member(0, self.best or self._policy())]
+        first = [] if self.done else [Member(0, self.best or self._average)]
         return FollowChain.of([*first, *self.members], self.task, self.trainer.waypoints,
                               max(steps_per_skill, self._max_steps))
 
@@ -208,7 +223,10 @@ class Follow:
         if len(over):
             self._position.put(over, self._fresh(len(over)))
             self._steps[over] = 0
+        before = trainer.updates
         trainer.train(len(actions))
+        self._average = self._average.blended(self._present(),
+                                              1.0 - self.settings.averaging ** (trainer.updates - before))
 
     def _explore(self, inputs: Array) -> Array:
         """Return actions [B, A] in [-1, 1]: the agent's with noise, a few of them random."""
@@ -220,13 +238,18 @@ class Follow:
         return actions
 
     def _fresh(self, count: int) -> Position:
-        """Return `count` executions that begin in states all along the plan up to the end, some in the first."""
-        rng = self.trainer.rng
+        """Return `count` executions that begin all along the plan up to the end, where others failed, or at its start.
+        """
+        rng, settings = self.trainer.rng, self.settings
         places = rng.integers(0, max(1, self.task.place(self.state.end)), count)
-        places[rng.random(count) < self.settings.start_fraction] = 0
-        return self.task.at(places)
+        places[rng.random(count) < settings.start_fraction] = 0
+        position = self.task.at(places)
+        if self._retries is not None:
+            chosen = np.flatnonzero(rng.random(count) < settings.retry_fraction)
+            position.put(chosen, self._retries[rng.integers(0, len(self._retries.states), len(chosen))])
+        return position
 
-    def _policy(self) -> Policy:
+    def _present(self) -> Policy:
         """Return the agent's policy, acting on the environment's controls."""
         model = self.trainer.model
         return replace(self.trainer.agent.policy(0), action_low=model.action_low.copy(),
@@ -234,13 +257,14 @@ class Follow:
 
     def _test(self) -> None:
         """Test the policy from the start; keep it if it passes, or if it is the best so far."""
-        state, policy = self.state, self._policy()
+        state, policy, before = self.state, self._average, self.trainer.counter.count
         found = self._try(policy, 0)
         if found.passed:
             self.members.insert(0, Member(0, policy))
             state.passed = True
             return
         state.tests += 1
+        state.tested = self.trainer.counter.count - before
         if (found.rate, found.blocked) > (state.best_rate, state.best_blocked):
             self.best, state.best_rate, state.best_blocked = policy, found.rate, found.blocked
         state.phase = "train"
@@ -277,44 +301,55 @@ class Follow:
         blocked = self._failures(relay, place, 1, 0.0)
         if len(blocked):
             return Verdict(False, 0.0, int(blocked[0]))
-        trials, passed = 0, None
+        trials, passed, gate = 0, None, self.settings.gate
         while passed is None:
-            blocked = np.concatenate([blocked, self._failures(relay, place, TRIALS_AT_ONCE,
-                                                              self.trainer.settings.test_epsilon)])
-            trials += TRIALS_AT_ONCE
-            passed = self.settings.gate.verdict(trials - len(blocked), trials)
+            count = min(max(trials, FIRST_TRIALS), gate.most_needed(trials - len(blocked), trials))
+            blocked = np.concatenate([blocked, self._failures(relay, place, count, self.trainer.settings.test_epsilon)])
+            trials += count
+            passed = gate.verdict(trials - len(blocked), trials)
         return Verdict(passed, 1.0 - len(blocked) / trials, int(blocked.max(initial=0)))
 
     def _failures(self, relay: Relay, place: int, count: int, epsilon: float) -> IndexArray:
-        """Return where those of `count` executions that fail come to their ends [at most count]."""
+        """Return where those of `count` executions that fail come to their ends [at most count]; keep their states."""
         tries = self.task.execute(relay, np.full(count, place), epsilon=epsilon, max_steps=self._max_steps,
                                   patience=4 * self.settings.line.patience, rng=self.trainer.rng,
                                   counter=self.trainer.counter)
+        mine = np.flatnonzero(tries.retries.progress.pointers < self.state.end)
+        if len(mine):
+            self._retries = tries.retries[mine]
         return tries.pointers[~tries.success]
 
     def snapshot(self) -> Snapshot:
         """Return everything needed to resume bit for bit."""
         plain, arrays = self.trainer.state()
-        policies = [member.policy for member in self.members] + ([self.best] if self.best else [])
+        policies = [self._average, *(member.policy for member in self.members), *([self.best] if self.best else [])]
         for index, policy in enumerate(policies):
             arrays |= {f"policy{index}.{name}": array for name, array in policy.to_arrays().items()}
         progress = self._position.progress
         arrays |= {"episode.states": self._position.states, "episode.pointers": progress.pointers,
                    "episode.stalled": progress.stalled, "episode.steps": self._steps}
+        if self._retries is not None:
+            arrays |= {"retry.states": self._retries.states, "retry.pointers": self._retries.progress.pointers}
         return Snapshot({"trainer": plain, "state": asdict(self.state), "policies": len(policies),
                          "firsts": [member.first for member in self.members]}, arrays)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Resume from what `snapshot` returned."""
         plain, arrays = snapshot.plain, snapshot.arrays
-        policies = [Policy.from_arrays({name.partition(".")[2]: array for name, array in arrays.items()
+        self._average, *policies = [Policy.from_arrays({name.partition(".")[2]: array for name, array in arrays.items()
                                         if name.startswith(f"policy{index}.")}) for index in range(plain["policies"])]
         self.members = [Member(*pair) for pair in zip(plain["firsts"], policies, strict=False)]
         self.best = policies[-1] if len(policies) > len(self.members) else None
         self.trainer.restore(plain["trainer"], {name: array for name, array in arrays.items()
-                                                if not name.startswith(("policy", "episode."))})
+                                                if not name.startswith(("policy", "episode.", "retry."))})
         self.state = FollowState(**plain["state"])
-        states = arrays["episode.states"].copy()
-        progress = Progress(arrays["episode.pointers"].copy(), arrays["episode.stalled"].copy())
-        self._position = Position(states, self.trainer.model.observe(states), progress)
+        self._position = self._at(arrays["episode.states"], arrays["episode.pointers"], arrays["episode.stalled"])
+        self._retries = None
+        if "retry.states" in arrays:
+            pointers = arrays["retry.pointers"]
+            self._retries = self._at(arrays["retry.states"], pointers, np.zeros_like(pointers))
         self._steps = arrays["episode.steps"].copy()
+
+    def _at(self, states: Array, pointers: IndexArray, stalled: IndexArray) -> Position:
+        """Return executions in some states [B, D]."""
+        return Position(states.copy(), self.trainer.model.observe(states), Progress(pointers.copy(), stalled.copy()))

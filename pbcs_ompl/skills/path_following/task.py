@@ -1,5 +1,6 @@
 """The task of a follower: a plan as a line, and executions along it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -84,10 +85,17 @@ class FollowStep:
 
 @dataclass(frozen=True, eq=False)
 class Tries:
-    """What executions did: which succeeded [B], and how far they came on the line [B]."""
+    """What executions did.
+
+    Attributes:
+        success: Which succeeded [B].
+        pointers: How far they came on the line [B].
+        retries: Where those that failed were in the steps around their last progress, as starts of new executions [N].
+    """
 
     success: BoolArray
     pointers: IndexArray
+    retries: Position
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,8 +185,9 @@ class FollowTask:
         """
         position = self.at(places)
         success, pointers = np.zeros(len(places), dtype=np.bool_), position.progress.pointers.copy()
-        alive = np.arange(len(places))
+        alive, trail = np.arange(len(places)), []
         for _ in range(max_steps):
+            trail.append((alive, position))
             controls = relay.act(self.inputs(position), position.progress.pointers)
             controls = with_random_actions(self.model, controls, epsilon, rng)
             counter.spend(len(alive))
@@ -189,7 +198,26 @@ class FollowTask:
             alive, position = alive[going], after.position[going]
             if not len(alive):
                 break
-        return Tries(success, pointers)
+        return Tries(success, pointers, around_last_progress(trail, ~success, self.view.patience))
+
+
+def around_last_progress(trail: Sequence[tuple[IndexArray, Position]], failed: BoolArray, reach: int) -> Position:
+    """Return where executions that failed were, as starts of new ones [N].
+
+    Args:
+        trail: For each step, the executions that made it and where they were before it.
+        failed: Which of the executions failed [B].
+        reach: The most steps before and after the last progress of each.
+    """
+    members, steps = (np.concatenate(parts) for parts in zip(*(
+        (alive, np.full(len(alive), step)) for step, (alive, _) in enumerate(trail)), strict=True))
+    stalled = np.concatenate([position.progress.stalled for _, position in trail])
+    last = np.zeros(len(failed), dtype=np.int64)
+    np.maximum.at(last, members, np.where(stalled == 0, steps, 0))
+    kept = failed[members] & (np.abs(steps - last[members]) <= reach)
+    states, observations, pointers = (np.concatenate(parts)[kept] for parts in zip(*(
+        (position.states, position.observations, position.progress.pointers) for _, position in trail), strict=True))
+    return Position(states, observations, Progress.at(pointers))
 
 
 def extended(corners: Array, length: float) -> Array:

@@ -29,7 +29,7 @@ def table(pbcs, pb, ddpg, td3, *, follow=lambda *_: True, follow_cost=30_000, **
 @pytest.fixture
 def verdicts(monkeypatch):
     """Return the claims on some records by their sentences; nothing is drawn."""
-    monkeypatch.setattr(analysis, "save", lambda figure, path: None)
+    monkeypatch.setattr(analysis, "publish", lambda figure, path: None)
     return lambda records: {claim.claim: claim for claim in analysis.analyse(records, Path())}
 
 
@@ -39,22 +39,24 @@ def find(claims, words):
 
 
 def test_a_world_as_the_thesis_describes_it(verdicts):
-    records = table(lambda size, _: True, lambda size, index: size == 2 and index < 9,
+    records = table(lambda size, _: True, lambda size, index: size == 2 and index < 7,
                     lambda size, index: size == 2 and index < 1, lambda size, index: size == 2 and index < 1)
     claims = verdicts(records)
     assert len(claims) == 15
     assert {text: claim.agrees for text, claim in claims.items()} == dict.fromkeys(claims, True)
     compared = find(claims, "PBCS solves more mazes than PB (").numbers
-    assert compared["only PBCS, only PB"] == [61, 0]
+    assert compared["only PBCS, only PB"] == [63, 0]
 
 
 def test_the_opposite_world(verdicts):
     records = table(lambda size, index: size < 4 and index < 9, lambda size, _: True, lambda size, _: size > 2,
                     lambda size, _: size > 2, follow=lambda size, index: size < 4 and index < 8, follow_cost=50_000)
     claims = verdicts(records)
-    unlike = {"PB solves 2x2 mazes much more often", "PBCS chains more skills"}
+    unlike = {"PB solves 2x2 mazes more often", "PBCS chains more skills"}
+    too_few = {"DDPG alone solves some 2x2", "TD3 alone solves some 2x2", "PB regularly fails"}  # ten runs of each
     for text, claim in claims.items():
-        assert claim.agrees is any(text.startswith(words) for words in unlike), text
+        expected = None if text.startswith(tuple(too_few)) else text.startswith(tuple(unlike))
+        assert claim.agrees is expected, text
 
 
 def test_a_chain_that_took_more_than_the_others_had_is_not_held_against_them(verdicts):
@@ -70,18 +72,19 @@ def test_four_runs_without_success_do_not_show_that_there_is_none(verdicts):
     records = [record(label, 2, index, False) for label in ("PBCS", "PB", "DDPG", "TD3") for index in range(4)]
     claims = verdicts(records)
     assert {text for text, claim in claims.items() if claim.agrees is not None} == {
-        text for text in claims if "95% of the mazes" in text}
+        text for text in claims if "95% of the mazes" in text or "PB regularly fails" in text}
     assert find(verdicts([*records, record("TD3", 2, 4, True)]), "TD3 alone solves some").agrees is True
 
 
 def test_pbcs_runs_first_and_then_the_others_in_balance():
     settings = STUDY.runs(STUDY.sweep, 20)
     labels = [one["label"] for one in settings]
-    assert len(settings) == 2 * (100 + 20) + 7 * (10 + 10 + 3)
-    assert set(labels[:120]) == {"PBCS"}
-    assert [(one["label"], one["size"]) for one in settings[120:148]] == [
-        (label, size) for size in SIZES for label in ("Follow", "PB", "DDPG", "TD3")]
-    assert {one["seed"] for one in settings[120:148]} == {500}
+    assert len(settings) == 2 * (100 + 20 + 5 + 3) + 2 * (7 * 10 + 5 + 3) + 9 * 3
+    assert set(labels[:128]) == {"PBCS"}
+    assert [(one["label"], one["size"]) for one in settings[128:164]] == [
+        (label, size) for size in (*SIZES, 20, 30) for label in ("Follow", "PB", "DDPG", "TD3")]
+    assert {one["seed"] for one in settings[128:164]} == {500}
+    assert {one["planner"] for one in settings if one["label"] == "Follow"} == {"Rides"}
 
 
 @pytest.mark.parametrize("label", ["PBCS", "TD3"])

@@ -13,7 +13,8 @@ from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, PbcsError, RunFolderError, UnknownName
 from pbcs_ompl.experiments.claims import rate
 from pbcs_ompl.experiments.run_study import run_study
-from pbcs_ompl.experiments.study import find_study, study_ids
+from pbcs_ompl.experiments.shipped_records import PACKED, pack, shipped_records
+from pbcs_ompl.experiments.study import find_study, study_folders, study_ids
 
 SWEEP = 'title = "Heads or tails"\nseeds = 3\nsides = 2\n'
 SCRIPT = '''
@@ -175,3 +176,36 @@ def test_the_list_names_every_study_of_the_project(capsys):
     assert main(["study", "--list", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["studies"] == study_ids()
     assert "deadlock" in study_ids()
+
+
+def test_shipped_records_make_the_same_figures_and_claims_without_any_run(folder, tmp_path, capsys):
+    made = run_study(find_study(str(folder)), out=tmp_path / "made", seeds=5)
+    assert pack(tmp_path / "made") == folder / "records.json.xz"
+    (folder / "log").unlink()
+    assert main(["study", str(folder), "--from-records", "--json", "--out", str(tmp_path / "again")]) == 0
+    again = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert again | {"out": "", "figures": []} == made.summary() | {"out": "", "figures": []}
+    assert (tmp_path / "again/figures/coins.png").read_bytes() == (tmp_path / "made/figures/coins.png").read_bytes()
+    assert not (folder / "log").exists()
+    run_study(find_study(str(folder)), out=tmp_path / "again", seeds=6)
+    assert log(folder) == ["coin-5"]
+
+
+def test_missing_and_damaged_shipped_records_are_named(folder, tmp_path, capsys):
+    study = find_study(str(folder))
+    with pytest.raises(InvalidOption, match="comes without records"):
+        run_study(study, out=tmp_path / "out", from_records=True)
+    (folder / "records.json.xz").write_bytes(b"xz")
+    with pytest.raises(DamagedFile, match=r"records\.json\.xz"):
+        run_study(study, out=tmp_path / "out", from_records=True)
+    assert main(["study", str(folder), "--from-records", "--seeds", "3"]) == 2
+    assert "leave out" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", [name for name, folder in study_folders().items() if (folder / PACKED).is_file()])
+def test_the_shipped_records_are_those_of_the_present_runs(name):
+    study = find_study(name)
+    seeds, records = shipped_records(study)
+    known = {run.name for run in study.all_runs(seeds)}
+    assert records
+    assert set(records) <= known

@@ -19,7 +19,8 @@ from pbcs_ompl.skills.agent_interface import load_agent
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings, Verdict
-from pbcs_ompl.skills.path_following.task import FollowTask, LineSettings, extended
+from pbcs_ompl.skills.path_following.follower import Progress, Relay
+from pbcs_ompl.skills.path_following.task import FollowTask, LineSettings, Position, around_last_progress, extended
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
 
@@ -246,3 +247,47 @@ def test_other_agents_follow_too() -> None:
     assert result.updates > 0
     assert result.chain is not None
     assert result.chain.num_policies >= 1
+
+
+def test_executions_that_fail_are_tried_again_from_around_their_last_progress(plan: Trajectory) -> None:
+    """Against a plain loop over each execution."""
+    task = FollowTask.of(MODEL, plan.states, LineSettings())
+    rng, reach = np.random.default_rng(0), 2
+    stalls = np.array([[0, 0, 1, 0, 1, 2, 3, 4], [0, 1, 2, 3, 4, 5, 6, 7], [0, 0, 0, 0, 0, 0, 0, 0]])
+    failed, lengths = np.array([True, True, False]), [8, 4, 8]
+    trail = []
+    for step in range(8):
+        alive = np.flatnonzero(np.array(lengths) > step)
+        begun = task.at(rng.integers(0, plan.length, len(alive)))
+        trail.append((alive, Position(begun.states, begun.observations,
+                                      Progress(begun.progress.pointers, stalls[alive, step]))))
+    expected = []
+    for step, (alive, position) in enumerate(trail):
+        for row, member in enumerate(alive):
+            last = max(index for index in range(lengths[member]) if stalls[member, index] == 0)
+            if failed[member] and abs(step - last) <= reach:
+                expected.append((*position.states[row], position.progress.pointers[row]))
+    found = around_last_progress(trail, failed, reach)
+    assert [(*state, pointer) for state, pointer in zip(found.states, found.progress.pointers, strict=True)] == expected
+    assert not found.progress.stalled.any()
+
+
+def test_a_refused_policy_is_trained_where_it_failed(plan: Trajectory) -> None:
+    following = method(plan.states, FollowSettings().updated({"retry_fraction": 1.0, "session_lengths": 1}))
+    following.step()
+    assert following._retries is None
+    following._failures(Relay([following._present()], [0]), 0, 3, 0.0)
+    assert following._retries is not None
+    places = {tuple(state) for state in following._retries.states}
+    assert {tuple(state) for state in following._fresh(50).states} <= places
+    again = method(plan.states)
+    again.restore(following.snapshot())
+    assert again._retries is not None
+    np.testing.assert_array_equal(again._retries.states, following._retries.states)
+
+
+def test_a_session_takes_its_share_of_the_test_before(plan: Trajectory) -> None:
+    following = method(plan.states, FollowSettings().updated({"test_share": 0.5, "session_lengths": 1}))
+    shortest = following._session_transitions
+    following.state.tested = 10 * shortest
+    assert following._session_transitions == 5 * shortest

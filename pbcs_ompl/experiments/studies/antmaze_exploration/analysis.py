@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.colors import LogNorm
-from scipy.stats import mannwhitneyu
 
-from pbcs_ompl.experiments.claims import FEWEST_PAIRS, SIGNIFICANCE, Claim, rate
+from pbcs_ompl.experiments.claims import Claim, always, at_least, greater_apart, rate
 from pbcs_ompl.experiments.planner_statistics import censored
-from pbcs_ompl.figures.canvas import save
+from pbcs_ompl.figures.canvas import publish
 from pbcs_ompl.figures.compare import distribution_figure
 from pbcs_ompl.figures.maze import map_axes
 from pbcs_ompl.resettable import make
@@ -30,7 +29,7 @@ def analyse(records: Records, figures: Path) -> list[Claim]:
         planners.setdefault(_name(record["planner"]), []).append(record)
         if "counts" in record:
             _draw_counts(record, figures)
-    save(distribution_figure({"AntMaze": planners}, title=f"budget {budget:,} transitions (Fig. 3.9)"),
+    publish(distribution_figure({"AntMaze": planners}, title=f"budget {budget:,} transitions (Fig. 3.9)"),
          figures / "transitions.png")
     return [*_solved(planners, f"within {budget:,} transitions"), *_fewer(planners, budget), _replayed(records)]
 
@@ -44,13 +43,12 @@ def _solved(planners: dict[str, Records], within: str) -> list[Claim]:
     solved = {name: [record["transitions"] for record in runs if record["solved"]] for name, runs in planners.items()}
     if "Ex" in planners:
         found = rate(len(solved["Ex"]), len(planners["Ex"]))
-        claims.append(Claim(f"Ex reaches the goal {within} in every seed", found["rate"] == 1.0,
-                            {"solved": found, "the most it needed": max(solved["Ex"], default=None)}, FIGURE))
+        claims.append(always(f"Ex reaches the goal {within} in every seed", "solved", found, FIGURE)
+                      .with_numbers(the_most_it_needed=max(solved["Ex"], default=None)))
     if "RRT-NH" in planners:
         runs = len(planners["RRT-NH"])
         missed = rate(runs - len(solved["RRT-NH"]), runs)
-        claims.append(Claim(f"RRT-NH often does not reach it {within} (at least a third of the seeds)",
-                            missed["rate"] >= OFTEN, {"not solved": missed}, FIGURE))
+        claims.append(at_least(f"RRT-NH often does not reach it {within}", "not solved", missed, OFTEN, FIGURE))
     return claims
 
 
@@ -60,24 +58,17 @@ def _fewer(planners: dict[str, Records], budget: int) -> list[Claim]:
     ex = needed.pop("Ex", np.empty(0))
     claims = []
     for name, others in needed.items():
-        decided = min(len(ex), len(others)) >= FEWEST_PAIRS
-        chance = float(mannwhitneyu(ex, others, alternative="less").pvalue) if decided else 1.0
-        medians = {f"median, {one}": float(np.median(values)) if len(values) else None
-                   for one, values in (("Ex", ex), (name, others))}
-        claims.append(Claim(f"Ex needs fewer transitions than {name} (Mann-Whitney, p < {SIGNIFICANCE})",
-                            chance < SIGNIFICANCE if decided else None,
-                            {**medians, f"solved, {name}": rate((others < budget).sum(), len(others)),
-                             "p uncorrected (Mann-Whitney)": chance},
-                            FIGURE if name == "RRT-NH" else "beyond the thesis",
-                            "" if decided else f"fewer than {FEWEST_PAIRS} seeds: no test can decide"))
+        claims.append(greater_apart(f"{name} needs more transitions than Ex", others.tolist(), ex.tolist(),
+                                    (name, "Ex"), FIGURE if name == "RRT-NH" else "beyond the thesis")
+                      .with_numbers(**{f"solved, {name}": rate((others < budget).sum(), len(others))}))
     return claims
 
 
 def _replayed(records: Records) -> Claim:
     solved = [record for record in records if record["solved"]]
     replayed = rate(sum(record["replay_ok"] for record in solved), len(solved))
-    return Claim("every path replays bit for bit in a fresh environment", replayed["rate"] == 1.0 if solved else None,
-                 {"replayed": replayed}, "what `replay_ok` promises")
+    return always("every path replays bit for bit in a fresh environment", "replayed", replayed,
+                  "what `replay_ok` promises")
 
 
 def _draw_counts(record: dict[str, Any], figures: Path) -> None:
@@ -90,4 +81,4 @@ def _draw_counts(record: dict[str, Any], figures: Path) -> None:
     image = axes.imshow(np.where(counts > 0, counts, np.nan).T, origin="lower", norm=LogNorm(1, max(2.0, counts.max())),
                         extent=(low[0], high[0], low[1], high[1]), zorder=1, interpolation="nearest")
     figure.colorbar(image, ax=axes, shrink=0.7, pad=0.02, label="nodes")
-    save(figure, figures / f"explored-{record['planner']}.png")
+    publish(figure, figures / f"explored-{record['planner']}.png")

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import LogNorm
 
-from pbcs_ompl.experiments.claims import Claim, rate
+from pbcs_ompl.experiments.claims import Claim, Rate, at_least, at_most, higher, no_higher, rate
 from pbcs_ompl.figures.by_group import rates_figure
-from pbcs_ompl.figures.canvas import save
+from pbcs_ompl.figures.canvas import QUANTITIES, publish
 from pbcs_ompl.figures.maze import legend_below, map_axes
 from pbcs_ompl.resettable import make
 
@@ -37,21 +37,17 @@ def _success_rate(records: Records, label: str, *, reward: str = "sparse",
     return rate(sum(record["succeeds"] for record in chosen), len(chosen))
 
 
-def _more(claim: str, one: tuple[str, dict[str, Any]], other: tuple[str, dict[str, Any]], source: str) -> Claim:
+def _more(claim: str, one: tuple[str, Rate], other: tuple[str, Rate], source: str) -> Claim:
     """Claim that the first rate is the higher one."""
-    decided = one[1]["n"] and other[1]["n"]
-    apart = one[1]["wilson"][0] > other[1]["wilson"][1] or other[1]["wilson"][0] > one[1]["wilson"][1]
-    return Claim(claim, one[1]["rate"] > other[1]["rate"] if decided else None,
-                 {**dict((one, other)), "the intervals lie apart": apart}, f"[Matheron2020] {source}",
-                 "" if apart else "the intervals overlap: so few runs cannot separate these rates")
+    return higher(claim, one[1], other[1], (one[0], other[0]), f"[Matheron2020] {source}")
 
 
 def _backplay(records: Records) -> list[Claim]:
     backplay, alone = _success_rate(records, "PB"), _success_rate(records, "DDPG")
     return [_more("PB succeeds more often than DDPG alone, from the sparse reward", ("PB", backplay), ("DDPG", alone),
                   "5.6, Fig. 5.3"),
-            Claim("even in the 2x2 maze PB regularly fails (in at least one run of ten)",
-                  backplay["rate"] <= 0.9 if backplay["n"] else None, {"succeeds": backplay}, "[Matheron2020] 5.6")]
+            at_least("even in the 2x2 maze PB regularly fails, in at least one run of ten", "fails",
+                     rate(backplay["n"] - backplay["successes"], backplay["n"]), 0.1, "[Matheron2020] 5.6")]
 
 
 def _discount(records: Records) -> list[Claim]:
@@ -60,9 +56,8 @@ def _discount(records: Records) -> list[Claim]:
     alone = rates["DDPG", LOW], rates["DDPG", HIGH]
     return [_more(f"PB succeeds more often with the discount {LOW} than with {HIGH}", (f"{LOW}", rates["PB", LOW]),
                   (f"{HIGH}", rates["PB", HIGH]), "5.5, Fig. 5.2"),
-            Claim(f"DDPG alone succeeds no more often with {LOW} than with {HIGH}",
-                  alone[0]["rate"] <= alone[1]["rate"] if alone[0]["n"] and alone[1]["n"] else None,
-                  {f"{LOW}": alone[0], f"{HIGH}": alone[1]}, "[Matheron2020] 5.5, Fig. 5.2")]
+            no_higher(f"DDPG alone succeeds no more often with {LOW} than with {HIGH}", *alone, (f"{LOW}", f"{HIGH}"),
+                      "[Matheron2020] 5.5, Fig. 5.2")]
 
 
 def _shaping(records: Records) -> list[Claim]:
@@ -77,9 +72,9 @@ def _shaping(records: Records) -> list[Claim]:
 def _never_found(record: dict[str, Any]) -> Claim:
     first = np.array(record["first_reward"])
     found = rate((first > 0).sum(), len(first))
-    return Claim(f"DDPG alone meets no reward within {record['steps']:,} steps in most runs", found["rate"] < 0.5,
-                 {"meet it": found, "first steps with reward": sorted(first[first > 0].tolist())},
-                 "[Matheron2020] 5.6, Fig. 5.4")
+    return at_most(f"DDPG alone meets no reward within {record['steps']:,} steps in most runs", "meet it", found, 0.5,
+                   "[Matheron2020] 5.6, Fig. 5.4").with_numbers(
+                       first_steps_with_reward=sorted(first[first > 0].tolist()))
 
 
 def _draw_rates(records: Records, figures: Path) -> None:
@@ -90,7 +85,7 @@ def _draw_rates(records: Records, figures: Path) -> None:
             found = _success_rate(records, label, reward=reward, discount=discount)
             counts[label][f"discount {discount}\n{reward} reward"] = found["successes"], found["n"]
     title = f"2x2 maze, at most {records[0]['max_transitions']:,} transitions (Figs. 5.2, 5.3, 7.1)"
-    save(rates_figure(counts, title=title, ylabel="share of runs that succeed"), figures / "rates.png")
+    publish(rates_figure(counts, title=title, ylabel="share of runs that succeed"), figures / "rates.png")
 
 
 def _draw_visits(record: dict[str, Any], figures: Path) -> None:
@@ -102,7 +97,7 @@ def _draw_visits(record: dict[str, Any], figures: Path) -> None:
     figure, axes = map_axes(model, title)
     edges = [np.linspace(low, high, len(visits) + 1)
              for low, high in zip(model.state_low, model.state_high, strict=True)]
-    mesh = axes.pcolormesh(*edges, np.where(visits > 0, visits, np.nan).T, norm=LogNorm(), cmap="Blues", zorder=1)
+    mesh = axes.pcolormesh(*edges, np.where(visits > 0, visits, np.nan).T, norm=LogNorm(), cmap=QUANTITIES, zorder=1)
     figure.colorbar(mesh, ax=axes, label="visits", shrink=0.8)
     legend_below(axes)
-    save(figure, figures / "visits.png")
+    publish(figure, figures / "visits.png")

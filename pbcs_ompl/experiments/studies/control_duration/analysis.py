@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.claims import Claim, greater, rate
+from pbcs_ompl.experiments.claims import Claim, always, greater, rate
 from pbcs_ompl.figures.by_group import values_figure
-from pbcs_ompl.figures.canvas import save
+from pbcs_ompl.figures.canvas import publish
 
 Records = list[dict[str, Any]]
 SOURCE = "ours: in [Matheron2020] each control lasts one step"
@@ -23,7 +23,7 @@ def analyse(records: Records, figures: Path) -> list[Claim]:
                 scenes.setdefault(record["scene"], []).append(record)
         named = {scene: {str(duration): list(column.values()) for duration, column in _needed(chosen).items()}
                  for scene, chosen in scenes.items()}
-        save(values_figure(named, xlabel="a control lasts 1 to this many steps", ylabel="transitions to the goal",
+        publish(values_figure(named, xlabel="a control lasts 1 to this many steps", ylabel="transitions to the goal",
                            log=True, title=f"{planner}: control duration"), figures / f"transitions-{planner}.png")
         for scene, chosen in scenes.items():
             claims += _fewer(planner, scene, chosen)
@@ -52,6 +52,5 @@ def _replayed(records: Records) -> Claim:
     solved = [record for record in records if record["solved"]]
     replayed = rate(sum(record["replay_ok"] for record in solved), len(solved))
     median = float(np.median([record["path_length"] for record in solved])) if solved else None
-    return Claim("every path with longer control durations replays bit for bit",
-                 replayed["rate"] == 1.0 if solved else None,
-                 {"replayed": replayed, "steps of a path, median": median}, "what `replay_ok` promises")
+    return always("every path with longer control durations replays bit for bit", "replayed", replayed,
+                  "what `replay_ok` promises").with_numbers(**{"steps of a path, median": median})

@@ -36,11 +36,42 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     if model.goal_circle is not None:
         found = plan(model, planner, seed=seed, max_transitions=100_000)
         path = None if found.trajectory is None else found.trajectory.states
-        record |= {"first_reward": found.transitions if found.solved else None, "path_length": found.path_length}
+        record |= {"first_reward": found.transitions if found.solved else None, "path_length": found.path_length,
+                   "fewest_steps": fewest_steps(model)}
         if seed == PICTURED_SEED and path is not None:
             record |= {"found_states": found.tree.states.tolist(), "found_parents": found.tree.parents.tolist(),
                        "path": path.tolist()}
     return record
+
+
+def fewest_steps(model: ResettableModel, spacing: float = 0.025) -> int | None:
+    """Return the fewest steps from the start to the goal, by breadth-first search over a lattice; None for no way.
+
+    Moves are all displacements within the action box that lead from a point of the lattice to another one, so the true
+    number is at most this one.
+
+    Args:
+        model: A maze: a point that moves by its action.
+        spacing: Of the lattice.
+    """
+    reach = round(float(model.action_high[0]) / spacing)
+    line = np.arange(-reach, reach + 1) * spacing
+    moves = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
+    start = model.initial_state(0)
+    front, seen = start[None], {(0, 0)}
+    for step in range(1, model.max_episode_steps + 1):
+        states, controls = np.repeat(front, len(moves), axis=0), np.tile(moves, (len(front), 1))
+        outcome = model.transition(states, controls)
+        if outcome.success.any():
+            return step
+        moved = np.abs(outcome.states - states - controls).max(axis=1) < 1e-9
+        keys = np.unique(np.round((outcome.states[moved] - start) / spacing).astype(np.int64), axis=0)
+        new = [key for key in map(tuple, keys.tolist()) if key not in seen]
+        if not new:
+            return None
+        seen.update(new)
+        front = start + spacing * np.array(new)
+    return None
 
 
 def cells(model: ResettableModel, states: Array, cell: float) -> tuple[Array, Array]:

@@ -1,20 +1,18 @@
 """Figures and claims of the half-cheetah study."""
 
-from math import comb
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import mannwhitneyu, t
+from scipy.stats import t
 
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.experiments.claims import Claim, rate
-from pbcs_ompl.figures.canvas import new_figure, save
+from pbcs_ompl.experiments.claims import PAIRS, Claim, always, at_least, at_most, greater_apart, rate
+from pbcs_ompl.figures.canvas import BAND, new_figure, publish
 
 LATE = 10
 """Episodes of the actor itself that say what has become of it; the thesis smooths over as many."""
-LEVEL, TOO_FEW = 0.05, "too few seeds to decide"
-P_VALUE = "p uncorrected (rank test)"
 GOOD, SOLVED = 0.975, 0.95
 """Shares of the best return: the thesis asks the first of the good policy; we call a mean above the second solved."""
 
@@ -60,9 +58,9 @@ def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
 def _found(variants: dict[str, Variant]) -> list[Claim]:
     found = {name: rate((chosen.returns > 0.0).any(axis=1).sum(), chosen.seeds) for name, chosen in variants.items()
              if not chosen.expert.size}
-    return [Claim("without priming, DDPG and DDPG-argmax find rewards, in every seed",
-                  all(numbers["rate"] == 1.0 for numbers in found.values()) if found else None, found,
-                  "[Matheron2020] 6.7")]
+    every = rate(sum(one["successes"] for one in found.values()), sum(one["n"] for one in found.values()))
+    return [always("without priming, DDPG and DDPG-argmax find rewards, in every seed", "find some", every,
+                   "[Matheron2020] 6.7").with_numbers(**found)]
 
 
 def _compared(variants: dict[str, Variant]) -> list[Claim]:
@@ -74,26 +72,20 @@ def _compared(variants: dict[str, Variant]) -> list[Claim]:
               for words, one, other, source in higher if {one, other} <= set(variants)]
     one, other = "ddpg-argmax-primed", "ddpg-argmax"
     if {one, other} <= set(variants):
-        p = _rank_test(variants[one], variants[other])
-        claims.append(Claim(f"priming does not change DDPG-argmax (rank test of its late returns: p >= {LEVEL})",
-                            None if p is None else p >= LEVEL,
-                            {one: variants[one].numbers, other: variants[other].numbers, P_VALUE: p},
-                            "[Matheron2020] Fig. 6.11", "" if p is not None else TOO_FEW))
+        ways = [greater_apart("priming does not change DDPG-argmax", variants[first].late.tolist(),
+                              variants[second].late.tolist(), (first, second), "[Matheron2020] Fig. 6.11")
+                for first, second in ((one, other), (other, one))]
+        changed = any(way.agrees for way in ways)
+        enough = min(variants[one].seeds, variants[other].seeds) >= PAIRS
+        claims.append(replace(ways[0], agrees=False if changed else True if enough else None,
+                              note="" if changed or enough else f"not enough seeds: {PAIRS} of each"))
     return claims
 
 
 def _above(words: str, one: Variant, other: Variant, name: str, against: str, source: str) -> Claim:
-    p = _rank_test(one, other)
-    return Claim(f"{words} (mean return of the last {LATE} episodes)", bool(one.late.mean() > other.late.mean()),
-                 {name: one.numbers, against: other.numbers, P_VALUE: p}, f"[Matheron2020] {source}",
-                 TOO_FEW if p is None else "" if p < LEVEL else "it may be chance")
-
-
-def _rank_test(one: Variant, other: Variant) -> float | None:
-    """Return p of the two-sided test of Mann and Whitney; None where so few seeds cannot fall below LEVEL."""
-    if 2.0 / comb(one.seeds + other.seeds, one.seeds) >= LEVEL:
-        return None
-    return round(float(mannwhitneyu(one.late, other.late).pvalue), 4)
+    return greater_apart(f"{words}: mean return of the last {LATE} episodes", one.late.tolist(), other.late.tolist(),
+                         (name, against), f"[Matheron2020] {source}").with_numbers(
+                             **{name: one.numbers, against: other.numbers})
 
 
 def _primed(variants: dict[str, Variant]) -> list[Claim]:
@@ -101,16 +93,14 @@ def _primed(variants: dict[str, Variant]) -> list[Claim]:
     expert = np.concatenate([np.empty(0), *(chosen.expert.ravel() for chosen in variants.values())])
     if expert.size:
         best = next(iter(variants.values())).best
-        claims.append(Claim(f"the good policy is good: above {GOOD * best:.0f} in most episodes, noise included",
-                            bool(np.median(expert) > GOOD * best),
-                            {"median": float(np.median(expert)), "least": float(expert.min()),
-                             "above": rate((expert > GOOD * best).sum(), expert.size)}, "[Matheron2020] 6.7"))
+        claims.append(at_least(f"the good policy is good: above {GOOD * best:.0f} in most episodes, noise included",
+                               "above", rate((expert > GOOD * best).sum(), expert.size), 0.5, "[Matheron2020] 6.7")
+                      .with_numbers(median=float(np.median(expert)), least=float(expert.min())))
     if "ddpg-primed" in variants:
         chosen = variants["ddpg-primed"]
         solved = rate((chosen.late > SOLVED * chosen.best).sum(), chosen.seeds)
-        claims.append(Claim("with priming DDPG does not solve it in most seeds (late return above "
-                            f"{SOLVED * chosen.best:.0f})", solved["rate"] < 0.5, {"solved": solved},
-                            "[Matheron2020] Fig. 6.11"))
+        claims.append(at_most("with priming DDPG does not solve it in most seeds (late return above "
+                              f"{SOLVED * chosen.best:.0f})", "solved", solved, 0.5, "[Matheron2020] Fig. 6.11"))
     return claims
 
 
@@ -121,7 +111,7 @@ def _draw(variants: dict[str, Variant], title: str, path: Path) -> None:
         smooth = np.array([_moving_average(row) for row in chosen.returns])
         episodes, mean, spread = chosen.episodes[-smooth.shape[1]:], smooth.mean(axis=0), smooth.std(axis=0)
         (line,) = axes.plot(episodes, mean, linewidth=2, label=f"{name} (N = {chosen.seeds})")
-        axes.fill_between(episodes, mean - spread, mean + spread, color=line.get_color(), alpha=0.15, linewidth=0)
+        axes.fill_between(episodes, mean - spread, mean + spread, color=line.get_color(), alpha=BAND, linewidth=0)
         for row in smooth:
             axes.plot(episodes, row, color=line.get_color(), linewidth=0.6, alpha=0.6)
     axes.axhline(next(iter(variants.values())).best, color="gray", linewidth=0.8, linestyle="--")
@@ -130,7 +120,7 @@ def _draw(variants: dict[str, Variant], title: str, path: Path) -> None:
     axes.set_title(title, fontsize=10)
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, fontsize=9)
-    save(figure, path)
+    publish(figure, path)
 
 
 def _moving_average(values: Array) -> Array:

@@ -7,9 +7,20 @@ import numpy as np
 from matplotlib.patches import Circle
 from scipy.stats import binomtest
 
-from pbcs_ompl.experiments.claims import FEWEST_PAIRS, SIGNIFICANCE, Claim, rate
+from pbcs_ompl.experiments.claims import (
+    FEWEST_PAIRS,
+    SIGNIFICANCE,
+    WORTH,
+    Claim,
+    at_least,
+    fewest_runs,
+    higher,
+    never,
+    rate,
+    sometimes,
+)
 from pbcs_ompl.figures.by_group import rates_figure, values_figure
-from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED, new_figure, save
+from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED, new_figure, publish
 from pbcs_ompl.figures.chain import chain_figure
 from pbcs_ompl.figures.maze import draw_map, project_2d
 from pbcs_ompl.resettable import make
@@ -17,6 +28,7 @@ from pbcs_ompl.resettable import make
 Records = list[dict[str, Any]]
 ALONE = ("DDPG", "TD3")
 THIRD = 1 / 3
+ONCE = "succeed once, at the end, without noise"
 BARS = (((2, 3, 4, 5, 7), 0.95, "[Matheron2020] 7.4: PBCS solves mazes up to 7x7; the bar is ours"),
         ((10, 15), 0.8, "ours: beyond [Matheron2020]"))
 MILLION = 1_000_000
@@ -48,12 +60,6 @@ def _solved(records: Records, key: str = "solved") -> dict[str, Any]:
     return rate(sum(record[key] for record in records), len(records))
 
 
-def _any_solved(records: Records) -> bool | None:
-    """Return whether any of them is solved; None when there are too few to say that there is none."""
-    solved = any(record["solved"] for record in records)
-    return solved if solved or len(records) >= FEWEST_PAIRS else None
-
-
 def _by_size(records: Records, label: str) -> dict[str, Any]:
     return {f"{size}x{size}": _solved(_of(records, label, size)) for size in _sizes(_of(records, label))}
 
@@ -83,35 +89,28 @@ def _alone(records: Records) -> list[Claim]:
     for label in ALONE:
         small = _of(records, label, 2)
         claims += [_fails_from_3x3(records, label, f"{label} alone"),
-                   Claim(f"{label} alone solves some 2x2 mazes within a million transitions",
-                         _any_solved(small), _counts(small),
-                         "[Matheron2020] 7.4: all but the simplest mazes are too hard")]
+                   sometimes(f"{label} alone solves some 2x2 mazes within a million transitions", "solved",
+                             _solved(small), "[Matheron2020] 7.4: all but the simplest mazes are too hard")
+                   .with_numbers(**{ONCE: _solved(small, "succeeds")})]
     return claims
 
 
 def _fails_from_3x3(records: Records, label: str, name: str) -> Claim:
     large = [record for record in _of(records, label) if record["size"] > 2]
-    solved = _any_solved(large)
-    return Claim(f"{name} solves no maze from 3x3 on within a million transitions",
-                 None if solved is None else not solved, {**_counts(large), **_by_size(large, label)},
-                 "[Matheron2020] 7.4")
-
-
-def _counts(records: Records) -> dict[str, Any]:
-    return {"solved": _solved(records), "succeed once, at the end, without noise": _solved(records, "succeeds")}
+    return (never(f"{name} solves no maze from 3x3 on within a million transitions", "solved", _solved(large),
+                  "[Matheron2020] 7.4")
+            .with_numbers(**{ONCE: _solved(large, "succeeds")}, **_by_size(large, label)))
 
 
 def _backplay(records: Records) -> list[Claim]:
     small = _of(records, "PB", 2)
     backplay, alone = _solved(small), _solved(_of(records, "DDPG", 2))
     return [_fails_from_3x3(records, "PB", "PB"),
-            Claim("PB regularly fails in 2x2 mazes (in at least one run of ten)",
-                  backplay["rate"] <= 0.9 if len(small) >= FEWEST_PAIRS else None, _counts(small),
-                  "[Matheron2020] 5.6"),
-            Claim("PB solves 2x2 mazes much more often than DDPG alone (the intervals lie apart)",
-                  backplay["wilson"][0] > alone["wilson"][1] if min(backplay["n"], alone["n"]) >= FEWEST_PAIRS
-                  else None,
-                  {"PB": backplay, "DDPG": alone}, "[Matheron2020] 5.6, Fig. 5.3")]
+            at_least("PB regularly fails in 2x2 mazes, in at least one run of ten", "fails",
+                     rate(backplay["n"] - backplay["successes"], backplay["n"]), 0.1, "[Matheron2020] 5.6")
+            .with_numbers(**{ONCE: _solved(small, "succeeds")}),
+            higher("PB solves 2x2 mazes more often than DDPG alone", backplay, alone, ("PB", "DDPG"),
+                   "[Matheron2020] 5.6, Fig. 5.3")]
 
 
 def _compared(records: Records) -> list[Claim]:
@@ -125,7 +124,7 @@ def _compared(records: Records) -> list[Claim]:
         chance = binomtest(ours, ours + theirs, alternative="greater").pvalue if ours + theirs else 1.0
         claims.append(Claim(f"within the same million transitions PBCS solves more mazes than {label} "
                             f"(p < {SIGNIFICANCE})",
-                            bool(chance < SIGNIFICANCE) if len(pairs) >= FEWEST_PAIRS else None,
+                            True if chance < SIGNIFICANCE else False if len(pairs) >= fewest_runs(WORTH) else None,
                             {"PBCS": rate(sum(one for one, _ in pairs), len(pairs)),
                              label: rate(sum(other for _, other in pairs), len(pairs)),
                              f"only PBCS, only {label}": [ours, theirs], "p (McNemar, exact)": float(chance)},
@@ -166,14 +165,14 @@ def _draw_rates(records: Records, figures: Path) -> None:
     counts = {label: {size: (sum(r["solved"] for r in runs), len(runs)) for size, runs in sizes.items()}
               for label, sizes in groups.items()}
     title = f"Solved mazes; at most {', '.join(budgets.values())} transitions"
-    save(rates_figure(counts, title=title), figures / "success.png")
+    publish(rates_figure(counts, title=title), figures / "success.png")
     costs = {label: {size: [r["transitions"] for r in runs if r["solved"]] for size, runs in sizes.items()}
              for label, sizes in groups.items()}
-    save(values_figure(costs, title="What solved runs cost, planning included", ylabel="transitions", log=True),
+    publish(values_figure(costs, title="What solved runs cost, planning included", ylabel="transitions", log=True),
          figures / "transitions.png")
     skills = {"PBCS": {f"{size}x{size}": [r["skills"] for r in _of(records, "PBCS", size) if r["solved"]]
                        for size in _sizes(records)}}
-    save(values_figure(skills, title="Skills in the chains of solved runs", ylabel="skills"), figures / "skills.png")
+    publish(values_figure(skills, title="Skills in the chains of solved runs", ylabel="skills"), figures / "skills.png")
 
 
 def _draw_table(records: Records, figures: Path) -> None:
@@ -187,7 +186,7 @@ def _draw_table(records: Records, figures: Path) -> None:
         _draw_one(record, figure.add_subplot(len(labels), len(sizes), place))
     figure.suptitle("Numbers: transitions; green background: solved; red: plan; green: the policy without noise; "
                     "purple: activation sets", fontsize=11)
-    save(figure, figures / "mazes.png")
+    publish(figure, figures / "mazes.png")
 
 
 def _draw_one(record: dict[str, Any], axes: Any) -> None:
@@ -211,4 +210,4 @@ def _draw_chain(record: dict[str, Any], figures: Path) -> None:
                           rollout=np.array(record["rollout"]),
                           activations=[(np.array(centre), radius) for centre, radius in record["activations"]],
                           title=f"PBCS, {record['transitions']:,} transitions, seed {record['seed']} (Fig. 7.4)")
-    save(figure, figures / f"chain-{size}x{size}.png")
+    publish(figure, figures / f"chain-{size}x{size}.png")

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.collections import LineCollection
 
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.experiments.claims import Claim, rate
-from pbcs_ompl.figures.canvas import new_figure, save
+from pbcs_ompl.experiments.claims import Claim, always, at_least, at_most, higher, rate
+from pbcs_ompl.figures.canvas import PALETTE, new_panels, publish
 from pbcs_ompl.figures.critic import critic_figure
 from pbcs_ompl.figures.diagnostics import success_figure
 from pbcs_ompl.figures.maze import draw_map
@@ -25,7 +25,7 @@ def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
         chosen = [record for record in trained if record["variant"] == variant]
         tables[variant] = (np.array(chosen[0]["at"]), np.concatenate([r["success"] for r in chosen], axis=1) > 0)
         _draw(next((record for record in chosen if 0 in record["seeds"]), chosen[0]), figures)
-    save(success_figure(tables, title="2x2 and 3x3 maze: solved by the policy without noise",
+    publish(success_figure(tables, title="2x2 and 3x3 maze: solved by the policy without noise",
                         xlabel="steps of each seed; offline DDPG: updates"), figures / "success.png")
     ever = {variant: rate(success.any(axis=0).sum(), success.shape[1]) for variant, (_, success) in tables.items()}
     last = {variant: rate(success[-1].sum(), success.shape[1]) for variant, (_, success) in tables.items()}
@@ -42,10 +42,10 @@ def _alone(ever: dict[str, Any], last: dict[str, Any]) -> list[Claim]:
         "bootstrapped": ("bootstrapped DDPG solves the 2x2 maze at some time", True, "Fig. 4.5", ""),
         "bootstrapped-without-layer-norm": ("so it does without layer norm", True, "Fig. 4.5", ""),
         "bootstrapped-3x3": ("in the 3x3 maze bootstrapped DDPG falls short", False, "Fig. 4.6, for a larger maze", "")}
-    return [Claim(f"{claim} ({'more' if solves else 'less'} than half of the seeds)",
-                  (ever[variant]["rate"] > 0.5) == solves and ever[variant]["rate"] != 0.5,
-                  {"solved at some evaluation": ever[variant], "solved at the last": last[variant]},
-                  f"[Matheron2020] {source}", note)
+    return [(at_least if solves else at_most)(f"{claim}, in {'more' if solves else 'less'} than half of the seeds",
+                                              "solved at some evaluation", ever[variant], 0.5,
+                                              f"[Matheron2020] {source}")
+            .with_numbers(solved_at_the_last=last[variant]).with_note(note)
             for variant, (claim, solves, source, note) in expected.items() if variant in ever]
 
 
@@ -56,16 +56,12 @@ def _compared(ever: dict[str, Any], last: dict[str, Any], tables: dict[str, Any]
         if {one, other} <= set(ever):
             steps, success = tables[one]
             first = [int(steps[row.argmax()]) for row in success.T if row.any()]
-            claims.append(Claim(f"{one} DDPG solves the 2x2 maze more often than {other} DDPG",
-                                ever[one]["rate"] > ever[other]["rate"],
-                                {one: ever[one], other: ever[other],
-                                 "the intervals lie apart": ever[one]["wilson"][0] > ever[other]["wilson"][1],
-                                 "first solved, median of the steps": float(np.median(first)) if first else None},
-                                "[Matheron2020] 4.5"))
-            claims.append(Claim(f"what {one} DDPG has solved it keeps (at the last evaluation, of those ever solved)",
-                                last[one]["successes"] == ever[one]["successes"] if first else None,
-                                {"kept": rate(last[one]["successes"], ever[one]["successes"])}, "[Matheron2020] 4.6",
-                                "" if first else "none was solved"))
+            claims.append(higher(f"{one} DDPG solves the 2x2 maze more often than {other} DDPG", ever[one], ever[other],
+                                 (one, other), "[Matheron2020] 4.5")
+                          .with_numbers(**{"first solved, median of the steps":
+                                           float(np.median(first)) if first else None}))
+            claims.append(always(f"what {one} DDPG has solved it keeps (at the last evaluation, of those ever solved)",
+                                 "kept", rate(last[one]["successes"], ever[one]["successes"]), "[Matheron2020] 4.6"))
     return claims
 
 
@@ -73,27 +69,25 @@ def _little_of_the_wall(record: dict[str, Any], figures: Path) -> Claim:
     _draw_mini_batch(record, figures)
     count = record["explored"] * len(record["seeds"])
     inside = rate(sum(record["stopped_inside"]), count)
-    return Claim("at most one in twenty of Ex's transitions shows the inner wall of the 2x2 maze",
-                 inside["rate"] <= 0.05, {"stopped by the inner wall": inside,
-                                          "stopped by any wall": rate(sum(record["stopped"]), count)},
-                 "[Matheron2020] 4.7, Fig. 4.7", "what can be learnt from them all the same: see offline DDPG")
+    return (at_most("at most one in twenty of Ex's transitions shows the inner wall of the 2x2 maze",
+                    "stopped by the inner wall", inside, 0.05, "[Matheron2020] 4.7, Fig. 4.7")
+            .with_numbers(stopped_by_any_wall=rate(sum(record["stopped"]), count))
+            .with_note("what can be learnt from them all the same: see offline DDPG"))
 
 
 def _draw_mini_batch(record: dict[str, Any], figures: Path) -> None:
     model = make("pbcs/Maze-v0", {"size": record["size"]})
     before, after = (np.array(states) for states in record["batch"])
-    figure, axes = new_figure(8.4, 4.4)
-    axes.remove()
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(1, 2, 8.4, 4.4)
     draw_map(left, model)
     segments = list(np.stack([before, after], axis=1))
     for panel in (left, right):
-        panel.add_collection(LineCollection(segments, color="C0", linewidth=1.2, zorder=3))
-        panel.plot(*after.T, ".", color="C0", markersize=3, zorder=3)
+        panel.add_collection(LineCollection(segments, color=PALETTE[0], linewidth=1.2, zorder=3))
+        panel.plot(*after.T, ".", color=PALETTE[0], markersize=3, zorder=3)
         panel.set(xlim=left.get_xlim(), ylim=left.get_ylim(), aspect="equal")
     figure.suptitle(f"{len(before)} of {record['explored']:,} transitions of Ex, with and without the maze (Fig. 4.7)",
                     fontsize=10)
-    save(figure, figures / "mini-batch.png")
+    publish(figure, figures / "mini-batch.png")
 
 
 def _draw(record: dict[str, Any], figures: Path) -> None:
@@ -106,7 +100,7 @@ def _draw(record: dict[str, Any], figures: Path) -> None:
                  f"{record['updates']:,} updates on them, {picture['steps']:,} steps (Fig. {record['figure']})")
         figure = critic_figure(model, policy, value, rollout=np.array(picture["rollout"]), title=title)
         ending = "" if picture["steps"] == record["steps"] else f"-{picture['steps']}"
-        save(figure, figures / f"critic-{record['variant']}{ending}.png")
+        publish(figure, figures / f"critic-{record['variant']}{ending}.png")
 
 
 def _values_of_states(look_up: Callable[[Array], Array]) -> Callable[[Array, Array], Array]:

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.claims import Claim, greater, rate
+from pbcs_ompl.experiments.claims import Claim, greater, higher, no_higher, rate
 from pbcs_ompl.figures.by_group import rates_figure, values_figure
-from pbcs_ompl.figures.canvas import save
+from pbcs_ompl.figures.canvas import publish
 
 Records = list[dict[str, Any]]
 SOURCE = "[Matheron2020] 7.5"
@@ -61,10 +61,7 @@ def _more(claim: str, records: Records, key: str, parameter: str, values: tuple[
 def _no_worse(claim: str, records: Records, parameter: str, value: float, than: float) -> Claim:
     swept = _swept(records, parameter)
     one, other = _solved(swept.get(value, [])), _solved(swept.get(than, []))
-    decided = one["n"] and other["n"] and value != than
-    return Claim(f"{claim} (its rate lies in the other's interval, or above)",
-                 one["rate"] >= other["wilson"][0] if decided else None,
-                 {f"{value:g}": one, f"{than:g}": other}, SOURCE)
+    return no_higher(f"{claim}: the latter does not solve more", other, one, (f"{than:g}", f"{value:g}"), SOURCE)
 
 
 def _alpha(records: Records) -> list[Claim]:
@@ -79,17 +76,14 @@ def _beta(records: Records) -> list[Claim]:
     low, usual, high = _ends(records, "beta")
     swept = {value: _swept(records, "beta").get(value, []) for value in (low, usual)}
     few, many = _solved(swept[low]), _solved(swept[usual])
-    decided = few["n"] and many["n"] and low != usual
     return [_more(f"beta = {high:g} costs more transitions than {usual:g}", records, "train_transitions", "beta",
                   (high, usual)),
             _no_worse(f"beta = {high:g} builds chains as well as {usual:g}", records, "beta", high, usual),
-            Claim(f"beta = {low:g} leads to chains that fail more often than with {usual:g} (the intervals lie apart)",
-                  few["wilson"][1] < many["wilson"][0] if decided else None,
-                  {f"{low:g}": few, f"{usual:g}": many,
-                   **{f"success with random actions, median, {value:g}":
-                      float(np.median([record["success_rate"] for record in runs]))
-                      for value, runs in swept.items() if runs}},
-                  SOURCE)]
+            higher(f"beta = {low:g} leads to chains that fail more often than with {usual:g}", many, few,
+                   (f"solved, {usual:g}", f"solved, {low:g}"), SOURCE)
+            .with_numbers(**{f"success with random actions, median, {value:g}":
+                             float(np.median([record["success_rate"] for record in runs]))
+                             for value, runs in swept.items() if runs})]
 
 
 def _radius(records: Records) -> list[Claim]:
@@ -107,12 +101,12 @@ def _draw(records: Records, parameter: str, figures: Path) -> None:
     groups = {f"{size}x{size}": {f"{value:g}": [r for r in runs if r["size"] == size] for value, runs in swept.items()}
               for size in sizes}
     name = NAMES[parameter]
-    save(rates_figure({size: {value: (sum(r["solved"] for r in runs), len(runs)) for value, runs in values.items()}
+    publish(rates_figure({size: {value: (sum(r["solved"] for r in runs), len(runs)) for value, runs in values.items()}
                        for size, values in groups.items()}, xlabel=name,
                       title=f"Solved by PBCS without verification, usual {name} {_usual(records, parameter):g}"),
          figures / f"{parameter}-solved.png")
     for key, label in (("train_transitions", "training transitions"), ("skills", "skills")):
         columns = {size: {value: [r[key] for r in runs] for value, runs in values.items()}
                    for size, values in groups.items()}
-        save(values_figure(columns, xlabel=name, ylabel=label, log=key != "skills", title=f"{label.capitalize()}"),
+        publish(values_figure(columns, xlabel=name, ylabel=label, log=key != "skills", title=f"{label.capitalize()}"),
              figures / f"{parameter}-{key.replace('_', '-')}.png")

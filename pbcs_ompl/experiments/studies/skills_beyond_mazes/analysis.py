@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.claims import Claim, rate
-from pbcs_ompl.figures.canvas import new_figure, save
+from pbcs_ompl.experiments.claims import Claim, at_least, no_higher, rate
+from pbcs_ompl.figures.canvas import new_figure, publish
 
 OURS = "beyond [Matheron2020], which trains in 2-D mazes only"
 LEARNT = "-learnt"
@@ -26,19 +26,18 @@ def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
 
 
 def _most_seeds(task: str, solved: dict[str, Any], records: list[dict[str, Any]]) -> Claim:
-    return Claim(f"PBCS solves {task} in most seeds", solved["rate"] > 0.5,
-                 {"solved": solved, **_medians(records)}, OURS, _failures(records))
+    return (at_least(f"PBCS solves {task} in most seeds", "solved", solved, 0.5, OURS)
+            .with_numbers(**_medians(records)).with_note(_failures(records)))
 
 
 def _learnt(task: str, solved: dict[str, Any], tasks: dict[str, list[dict[str, Any]]]) -> Claim:
     ball, learnt = solved[task], solved[task + LEARNT]
-    apart = ball["wilson"][0] > learnt["wilson"][1] or learnt["wilson"][0] > ball["wilson"][1]
     numbers: dict[str, Any] = {}
     for name, one in (("ball", task), ("learnt", task + LEARNT)):
-        numbers |= {f"{name}, solved": solved[one]}
         numbers |= {f"{name}, {key}": value for key, value in _medians(tasks[one]).items()}
-    return Claim(f"on {task} learnt activation sets do as well as balls (the intervals overlap)", not apart, numbers,
-                 "[Matheron2020] 7.2.4 proposes them", _failures(tasks[task + LEARNT]))
+    return (no_higher(f"on {task} balls solve no more than learnt activation sets", ball, learnt, ("ball", "learnt"),
+                      "[Matheron2020] 7.2.4 proposes them")
+            .with_numbers(**numbers).with_note(_failures(tasks[task + LEARNT])))
 
 
 def _medians(records: list[dict[str, Any]]) -> dict[str, Any]:
@@ -68,4 +67,4 @@ def _draw(solved: dict[str, Any], tasks: dict[str, list[dict[str, Any]]], path: 
     axes.grid(alpha=0.3)
     counts = " or ".join(map(str, sorted({len(chosen) for chosen in tasks.values()})))
     axes.set_title(f"PBCS beyond mazes, N = {counts}; median transitions of training", fontsize=10)
-    save(figure, path)
+    publish(figure, path)

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.experiments.claims import Claim, rate
-from pbcs_ompl.figures.canvas import new_figure, save
+from pbcs_ompl.core.statistics import wilson
+from pbcs_ompl.experiments.claims import Claim, about, rate
+from pbcs_ompl.figures.canvas import BAND, new_figure, publish
 
 DEVIATIONS = 4.0
 """A simulation agrees when it is nowhere further off than this many standard deviations."""
@@ -71,15 +72,15 @@ def _agents(agents: dict[str, Any], greedy: dict[str, Any], figures: Path) -> li
     exact = np.array(greedy["exact"])
     figure, axes = new_figure(7.2, 4.6)
     axes.plot(steps, exact, linewidth=2, label="p-greedy random walk, exact")
-    axes.plot(steps, found, linewidth=2, label=f"untrained DDPG with epsilon-greedy noise (N = {count})")
+    (line,) = axes.plot(steps, found, linewidth=2, label=f"untrained DDPG with ε-greedy noise (N = {count:,})")
+    bounds = np.transpose([wilson(round(share * count), count) for share in found])
+    axes.fill_between(steps, *bounds, color=line.get_color(), alpha=BAND, linewidth=0)
     _finish(axes, figures / "agents.png", figure, "When the reward is found first (Fig. A.5)")
-    low, high = rate((first > 0).sum(), count)["wilson"]
-    return [Claim("untrained epsilon-greedy agents find the reward like the p-greedy walk (50 steps, in the interval)",
-                  low <= exact[-1] <= high,
-                  {"agents": rate((first > 0).sum(), count), "walk": exact[-1], "within one step, agents": found[0],
-                   "largest first action": agents["largest_first_action"]}, "[Matheron2020] A.4.3, Fig. A.5",
-                  "a first action is small but not 0: half of the actors go left and find the reward at once, and the "
-                  "others move right by themselves, away from it")]
+    return [about(f"untrained epsilon-greedy agents ({agents['initialisation']} initialisation) find the reward in "
+                  f"{len(steps)} steps as often as the p-greedy walk", "agents", rate((first > 0).sum(), count),
+                  float(exact[-1]), 0.05, "[Matheron2020] A.4.3, Fig. A.5")
+            .with_numbers(**{"walk": float(exact[-1]), "within one step, agents": float(found[0]),
+                             "largest first action": agents["largest_first_action"]})]
 
 
 def _draw_densities(record: dict[str, Any], figures: Path) -> None:
@@ -95,7 +96,7 @@ def _draw_densities(record: dict[str, Any], figures: Path) -> None:
     axes.set_ylabel("density, reward not found before")
     axes.set_title(f"{TITLES[record['kind']]} ({DENSITIES[record['kind']]})", fontsize=10)
     axes.legend(frameon=False, fontsize=9)
-    save(figure, figures / f"densities-{record['kind']}.png")
+    publish(figure, figures / f"densities-{record['kind']}.png")
 
 
 def _draw_success(record: dict[str, Any], figures: Path) -> None:
@@ -116,4 +117,4 @@ def _finish(axes: Any, path: Path, figure: Any, title: str) -> None:
     axes.set_title(title, fontsize=10)
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, fontsize=9)
-    save(figure, path)
+    publish(figure, path)

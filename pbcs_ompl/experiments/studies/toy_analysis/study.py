@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.agents import DDPG
+from pbcs_ompl.agents import DDPG, DDPGSettings
 from pbcs_ompl.agents.noise import EpsilonGreedy, draw_all
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.experiments.studies.toy_analysis.random_walk import densities, simulate
@@ -21,7 +21,8 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
     walks = [{"name": f"{kind}-{seed}", "kind": kind, "share": share, "seed": seed, "walks": sweep["walks"],
               "steps": sweep["steps"], "density_after": sweep["density_after"]}
              for kind, share in sweep["shares"].items() for seed in range(seeds)]
-    return [*walks, {"name": "agents", "kind": "agents", "agents": sweep["toy"]["agents"], "steps": sweep["steps"]}]
+    return [*walks, {"name": "agents", "kind": "agents", "agents": sweep["toy"]["agents"],
+                      "initialisation": sweep["toy"]["initialisation"], "steps": sweep["steps"]}]
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
@@ -68,7 +69,8 @@ def theorem_5(steps: int, share: float) -> list[float]:
 def _agents(settings: dict[str, Any]) -> dict[str, Any]:
     """Run one episode of 1D-Toy with untrained, epsilon-greedy DDPG agents; return when each finds the reward."""
     model, steps = make("pbcs/Toy1D-v0"), settings["steps"]
-    agent = DDPG(1, model.action_low, model.action_high, seeds=range(settings["agents"]))
+    agent = DDPG(1, model.action_low, model.action_high, seeds=range(settings["agents"]),
+                 settings=DDPGSettings(initialisation=settings["initialisation"]))
     noise = EpsilonGreedy(0.1)
     draws = draw_all(noise, [SeedTree(seed).child("walk").generator() for seed in agent.seeds], (steps, 1), 1)
     states, first = np.zeros((len(agent.seeds), 1)), np.full(len(agent.seeds), -1)
