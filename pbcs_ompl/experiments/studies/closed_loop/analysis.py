@@ -7,7 +7,7 @@ import numpy as np
 
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.experiments.claims import FEWEST_PAIRS, Claim, rate
-from pbcs_ompl.figures.canvas import new_panels, save
+from pbcs_ompl.figures.canvas import colour, new_panels, publish
 
 Records = list[dict[str, Any]]
 COLUMNS = 3
@@ -64,7 +64,7 @@ def _draw(records: Records, tasks: list[str], figures: Path) -> None:
             rates = np.array([reached / total for reached, total in counts])
             bounds = np.array([wilson(*count) for count in counts]).T
             axes.errorbar([100 * float(level) + 0.25 * (index - 2.5) for level in levels], rates,
-                          np.abs(bounds - rates), fmt="o-", capsize=2, linewidth=1.2, markersize=4, color=f"C{index}",
+                          np.abs(bounds - rates), fmt="o-", capsize=2, linewidth=1.2, markersize=4, color=colour(index),
                           label=f"{_label(method, records)}, {len(chosen)} seeds, N = {counts[0][1]}")
         axes.set_title(task, fontsize=10)
         axes.set_ylim(-0.04, 1.04)
@@ -75,7 +75,7 @@ def _draw(records: Records, tasks: list[str], figures: Path) -> None:
     for axes in panels[len(tasks):]:
         axes.remove()
     figure.suptitle("Executions of a plan by the judge (95 % Wilson; executions of one seed share a plan)", fontsize=11)
-    save(figure, figures / "closed-loop.png")
+    publish(figure, figures / "closed-loop.png")
 
 
 def _table(records: Records, tasks: list[str]) -> str:
