@@ -13,7 +13,6 @@ from pbcs_ompl.core.tree import Tree, resized_copy
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray, Transition
 from pbcs_ompl.planners.compiled import CompiledStep, step_of
 from pbcs_ompl.planners.context import PlanningContext
-from pbcs_ompl.planners.kernels import batch_loop
 
 
 class BatchPropagator(ABC):
@@ -140,6 +139,8 @@ class ModelPropagator(BatchPropagator):
 
     def _expand_compiled(self, compiled: CompiledStep, tree: Tree, nodes: IndexArray, controls: Array,
                          durations: IndexArray) -> int:
+        from pbcs_ompl.planners.kernels import batch_loop  # compiled when it is imported, and rarely used
+
         first, most = len(tree), min(self.counter.left, int(durations.sum()))
         tree.reserve(most)
         written, reached = batch_loop.expand(compiled.parameters, self.feature_dims, tree.columns, first, most,

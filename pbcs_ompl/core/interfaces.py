@@ -12,7 +12,7 @@ import numpy as np
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.tree import Tree
-from pbcs_ompl.core.types import Array, BoolArray, Capability, Counter, Transition
+from pbcs_ompl.core.types import Array, BoolArray, Capability, Counter, IndexArray, Transition
 
 
 class ResettableModel(Protocol):
@@ -154,6 +154,11 @@ class BatchPlanner(Protocol):
     @property
     def tree(self) -> Tree | None:
         """The tree as arrays; None before `solve`."""
+        ...
+
+    @property
+    def solution(self) -> IndexArray | None:
+        """The nodes [T+1] of the tree from a root to the goal, one a step; None unless the last `solve` reached it."""
         ...
 
     @property
