@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from pbcs_ompl.cli.streams import print_output
-from pbcs_ompl.cli.values import choice, fraction, integer, json_object, json_objects, part, seconds
+from pbcs_ompl.cli.values import amount, choice, fraction, integer, json_object, json_objects, part, seconds
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
@@ -135,7 +135,12 @@ def _plan(verb: Parser) -> None:
     _add_seed(verb)
     _add_budget(verb, 1_000_000)
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop after this much wall time")
+    _add_improve(verb)
     verb.add_argument("--video", metavar="FILE", help="film the path that was found; .mp4 or .gif")
+    verb.add_argument("--follow", metavar="FOLLOWER",
+                      help="let a robot's follower drive along the plan, smoothed: a folder of pbcs train, or ant")
+    verb.add_argument("--episodes", type=integer(1), metavar="N", help="of --follow: number of executions (30)")
+    verb.add_argument("--epsilon", type=fraction, metavar="X", help="of --follow: fraction of random actions (0)")
     _add_out(verb)
     verb.add_argument("--no-pictures", action="store_true", help="write no tree.png, which takes half a second")
 
@@ -330,6 +335,12 @@ def _add_seed(verb: Parser) -> None:
 def _add_budget(verb: Parser, default: int) -> None:
     verb.add_argument("--max-transitions", type=integer(1), default=default, metavar="N",
                       help=f"stop after N environment steps ({default:,})")
+
+
+def _add_improve(verb: Parser) -> None:
+    verb.add_argument("--improve", type=amount, metavar="AMOUNT",
+                      help="make the plan shorter afterwards: with 5000 transitions, 10%% of those of the search, "
+                           "or in 2s")
 
 
 def _add_trust(verb: Parser, source: str) -> None:

@@ -36,7 +36,26 @@ class PlanConfig(Budgets):
     planner_kwargs: Table
     seed: Count
     environment: EnvValues
+    improve: NotRequired[Positive | str]
     versions: NotRequired[Versions]
+
+
+class ProgressOfImprovement(TypedDict):
+    """How the length of a plan fell."""
+
+    transitions: list[Count]
+    seconds: list[Seconds]
+    length: list[Count]
+
+
+class Improvement(TypedDict):
+    """What making a plan shorter has brought and used."""
+
+    before: Count
+    after: Count
+    transitions: Count
+    seconds: Seconds
+    progress: ProgressOfImprovement
 
 
 class TrainConfig(TypedDict):
@@ -120,6 +139,7 @@ class PlanResult(TypedDict):
     nodes: Count
     path_length: Count | None
     replay_ok: bool | None
+    improvement: NotRequired[Improvement]
 
 
 class TrainResult(TypedDict):

@@ -41,7 +41,8 @@ def test_pbcs_solves_the_small_maze(tmp_path):
     assert result.solved
     assert result.robust.success_rate >= 0.95
     assert {path.name for path in (tmp_path / "run").iterdir()} == {
-        ".sha256", "config.toml", "provenance.json", "result.json", "plan.json", "trajectory.npz", "chain"}
+        ".sha256", "config.toml", "provenance.json", "result.json", "plan.json", "trajectory.npz", "chain",
+        "progress.csv"}
     chain = SkillChain.load(tmp_path / "run" / "chain")
     model = make("pbcs/Maze-v0", MAZE)
     np.testing.assert_array_equal(chain.rollout(model, model.initial_state(0)),
