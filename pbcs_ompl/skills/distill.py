@@ -218,6 +218,7 @@ class _Distillation:
         success, in_turn = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
         handed_over = np.where(np.arange(count) % 2, self.rng.integers(0, 2 * self.longest + 1, count), 0)
         kept: list[tuple[IndexArray, Array, Array]] = []
+        step = 0
         for step in range(self.teacher.time_limit):
             seen = model.observe(states[alive])
             controls = actions.to_controls(teacher.act(seen, alive))
