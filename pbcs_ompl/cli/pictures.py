@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pbcs_ompl.cli.terminal import warn
 from pbcs_ompl.core.callbacks import describe
+from pbcs_ompl.core.collector import no_collection
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
@@ -19,9 +20,11 @@ if TYPE_CHECKING:
 def draw(name: str, picture: Callable[[], Any], out: Path) -> None:
     """Write the figure that `picture` returns to out/name, or say in one line on stderr why not."""
     try:
-        from pbcs_ompl.figures.canvas import save
+        with no_collection():
+            from pbcs_ompl.figures.canvas import save
 
-        save(picture(), out / name)
+            figure = picture()
+        save(figure, out / name)
     except PbcsError as error:
         warn(f"no picture {name}: {error}")
     except Exception as error:  # of matplotlib, or of the environment

@@ -40,7 +40,7 @@ def _plan(arguments: Namespace, model: ResettableModel, out: Path) -> PlanResult
     with ProgressDisplay("plan", budget=arguments.max_transitions, max_seconds=arguments.max_seconds) as display:
         return plan(model, arguments.planner, planner_kwargs=arguments.planner_kwargs, seed=arguments.seed,
                     max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds, out=out,
-                    on_progress=display)
+                    improve=arguments.improve, on_progress=display)
 
 
 def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[tuple[str, str]]:
@@ -50,6 +50,10 @@ def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[
     lines = [("solved" if result.solved else "not solved", effort), ("tree", f"{format_number(result.nodes)} nodes")]
     if result.solved:
         lines.append(("path", f"{format_number(result.path_length)} steps, verified in a fresh environment"))
+        if result.improvement is not None:
+            lines.append(("before", f"{format_number(result.improvement.before)} steps; improved with "
+                                    f"{format_number(result.improvement.transitions)} transitions, "
+                                    f"{format_duration(result.improvement.seconds)}"))
         words = environment_words(environment(arguments))
         following = command(["train", *words, "--path", str(out)])
     elif result.found:

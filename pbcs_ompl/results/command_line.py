@@ -96,6 +96,15 @@ def eval_words(folder: str | Path, *, episodes: int | None = None, epsilon: floa
                                    for word in (name, str(value))), *_trust(trust)]
 
 
+def distill_words(config: dict[str, Any]) -> Words:
+    """Return the words of a distillation; none where it is not known which chain it was made from."""
+    if not config["chain"]:
+        return []
+    trust = bool(EnvSpec.from_dict(config["environment"]).modules)
+    return ["distill", config["chain"], "--seed", str(config["seed"]), *_json_words("--settings", config["settings"]),
+            *_trust(trust)]
+
+
 def compare_words(config: dict[str, Any]) -> Words:
     """Return the words of a comparison whose seeds are 0, 1, ..."""
     options = {name: chosen for name, chosen in config["planner_kwargs"].items() if chosen}

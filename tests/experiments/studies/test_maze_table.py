@@ -79,11 +79,12 @@ def test_four_runs_without_success_do_not_show_that_there_is_none(verdicts):
 def test_pbcs_runs_first_and_then_the_others_in_balance():
     settings = STUDY.runs(STUDY.sweep, 20)
     labels = [one["label"] for one in settings]
-    assert len(settings) == 2 * (100 + 20) + 7 * (10 + 10 + 3)
-    assert set(labels[:120]) == {"PBCS"}
-    assert [(one["label"], one["size"]) for one in settings[120:148]] == [
-        (label, size) for size in SIZES for label in ("Follow", "PB", "DDPG", "TD3")]
-    assert {one["seed"] for one in settings[120:148]} == {500}
+    assert len(settings) == 2 * (100 + 20 + 5 + 3) + 2 * (7 * 10 + 5 + 3) + 9 * 3
+    assert set(labels[:128]) == {"PBCS"}
+    assert [(one["label"], one["size"]) for one in settings[128:164]] == [
+        (label, size) for size in (*SIZES, 20, 30) for label in ("Follow", "PB", "DDPG", "TD3")]
+    assert {one["seed"] for one in settings[128:164]} == {500}
+    assert {one["planner"] for one in settings if one["label"] == "Follow"} == {"Rides"}
 
 
 @pytest.mark.parametrize("label", ["PBCS", "TD3"])

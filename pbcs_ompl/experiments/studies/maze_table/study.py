@@ -15,6 +15,7 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
     common = {"preset": sweep["preset"], "wall_penalty": sweep["wall_penalty"]}
     chosen = [{"name": f"{name}-{size}-{index}", "label": name, "size": int(size), "index": index,
                "seed": sweep["first_seed"] + index, "method": method["method"], "agent": method["agent"],
+               "planner": method.get("planner"),
                "max_transitions": method["max_transitions"], "episode_steps": options["episode_steps"], **common}
               for index in range(seeds) for size, options in sweep["sizes"].items()
               for name, method in sweep["methods"].items() if index < min(method["seeds"], options["seeds"])]
@@ -27,7 +28,8 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     kwargs = {"size": size, "wall_penalty": settings["wall_penalty"]} | ({"maze_seed": seed} if size > 3 else {})
     changes = {} if settings["method"] in ("pbcs", "follow") else {"max_steps": settings["episode_steps"]}
     record, result = trained("pbcs/Maze-v0", kwargs, settings=changes, seed=seed,
-                             **{key: settings[key] for key in ("method", "agent", "preset", "max_transitions")})
+                             **{key: settings[key] for key in ("method", "agent", "planner", "preset",
+                                                               "max_transitions")})
     if settings["index"] == PICTURED_INDEX and result.chain is not None:
         return settings | record | _picture(result.chain, result.trajectory, kwargs)
     return settings | record
