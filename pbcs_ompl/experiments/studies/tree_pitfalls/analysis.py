@@ -14,7 +14,7 @@ from pbcs_ompl.figures.canvas import BAND, new_panels, publish
 Records = list[dict[str, Any]]
 NAMES = {"RRTNH": "RRT-NH"}
 CONSTANT = 2.0
-"""An expansion in a tree ten times as large may take up to so much longer: caches are smaller than trees."""
+"""An expansion in a tree ten times as large may take up to this factor longer: caches are smaller than trees."""
 DEEPER = 3.0
 
 
