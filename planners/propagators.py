@@ -104,7 +104,7 @@ class ModelPropagator(BatchPropagator):
         model = self._model
         return PlanningContext(model.feature_low, model.feature_high, model.bin_size, model.action_low,
                                model.action_high, model.max_episode_steps, model.parallel_batch,
-                               model.advance_towards, self._durations)
+                               model.advance_towards, self._durations, model.feature_periods)
 
     def new_tree(self) -> Tree:
         """Return an empty tree of states [D] and features [F]."""

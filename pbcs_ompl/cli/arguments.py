@@ -135,6 +135,10 @@ def _plan(verb: Parser) -> None:
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop after this much wall time")
     _add_improve(verb)
     verb.add_argument("--video", metavar="FILE", help="film the path that was found; .mp4 or .gif")
+    verb.add_argument("--follow", metavar="FOLLOWER",
+                      help="let a robot's follower drive along the plan, smoothed: a folder of pbcs train, or ant")
+    verb.add_argument("--episodes", type=integer(1), metavar="N", help="of --follow: number of executions (30)")
+    verb.add_argument("--epsilon", type=fraction, metavar="X", help="of --follow: fraction of random actions (0)")
     _add_out(verb)
     verb.add_argument("--no-pictures", action="store_true", help="write no tree.png, which takes half a second")
 

@@ -51,6 +51,11 @@ SMALL = {
         for name in ("small", "small-learnt", "again")}},
     "presets": {"max_transitions": 1500, "sizes": {"2": {"seeds": 1}}},
     "antmaze-exploration": {"max_transitions": 100},
+    "closed-loop": {
+        "noise": [0.0, 0.1], "plan_transitions": 5000,
+        "methods": {**{method: {"seeds": 1, "episodes": 2} for method in ("open-loop", "lqr", "follow")},
+                    "mppi": {"seeds": 1, "episodes": 1}, "reverse-curriculum": {"seeds": 1, "episodes": 1}},
+        "tasks": {"maze-2": {"env": "pbcs/Maze-v0", "env_kwargs": {"size": 2}, "max_transitions": 2000}}},
     "control-duration": {"max_transitions": 5000, "control_durations": [1, 3],
                          "scenes": {"maze-2": {"env": "pbcs/Maze-v0", "env_kwargs": {"size": 2}}}},
 }
