@@ -9,6 +9,7 @@ from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.envs import box_disc_kernels as kernels
 from pbcs_ompl.envs.point_env import CompiledStep, PointEnv
+from pbcs_ompl.envs.point_kernels import WholeStep
 from pbcs_ompl.envs.rendering import rasterise
 
 EXTENT = 5.0
@@ -38,9 +39,9 @@ class BoxEnv(PointEnv):
         """Return the next states [B, 2] and whether the border was hit [B]."""
         return kernels.move_in_box(self.settings, states, controls)
 
-    def move_one(self, x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
-        """Return what `move` does with one point."""
-        return kernels.move_one_in_box(self.settings, x, y, a, b)
+    def move_one(self, x: float, y: float, a: float, b: float) -> WholeStep:
+        """Return what `move` does with one point, and what that shows."""
+        return kernels.step_one_in_box(self.settings, x, y, a, b)
 
     def compiled_step(self) -> CompiledStep:
         """Return the step as a function for compiled planners."""
@@ -92,9 +93,9 @@ class DiscEnv(PointEnv):
         """Return the next states [B, 2] and whether the border was hit [B]."""
         return kernels.move_in_disc(self.settings, states, controls)
 
-    def move_one(self, x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
-        """Return what `move` does with one point."""
-        return kernels.move_one_in_disc(self.settings, x, y, a, b)
+    def move_one(self, x: float, y: float, a: float, b: float) -> WholeStep:
+        """Return what `move` does with one point, and what that shows."""
+        return kernels.step_one_in_disc(self.settings, x, y, a, b)
 
     def compiled_step(self) -> CompiledStep:
         """Return the step as a function for compiled planners."""
@@ -108,4 +109,4 @@ class DiscEnv(PointEnv):
         """Return the picture as an array [480, 480, 3] of uint8, for "rgb_array"."""
         if self.render_mode is None:
             return None
-        return rasterise(EXTENT, self.walls, self.goal_circle, self._state, ground=self.disc)
+        return rasterise(EXTENT, self.walls, self.goal_circle, self.get_env_state(), ground=self.disc)

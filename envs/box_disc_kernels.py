@@ -4,7 +4,7 @@ import numpy as np
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
+from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, WholeStep, displacement, outcome, whole_step
 
 Step = tuple[float, float, bool]
 
@@ -22,9 +22,10 @@ def _move_in_box(settings: Array, x: float, y: float, a: float, b: float) -> Ste
 
 
 @njit()
-def move_one_in_box(settings: Array, x: float, y: float, a: float, b: float) -> Step:
-    """Return the next position of one point, and whether the step hit the border."""
-    return _move_in_box(settings, x, y, a, b)
+def step_one_in_box(settings: Array, x: float, y: float, a: float, b: float) -> WholeStep:
+    """Return all that a step of one point shows (see `whole_step`)."""
+    x1, y1, hit = _move_in_box(settings, x, y, a, b)
+    return whole_step(settings, x1, y1, hit)
 
 
 @njit()
@@ -84,9 +85,10 @@ def _move_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> St
 
 
 @njit()
-def move_one_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> Step:
-    """Return the next position of one point, and whether the step hit the border."""
-    return _move_in_disc(settings, x, y, a, b)
+def step_one_in_disc(settings: Array, x: float, y: float, a: float, b: float) -> WholeStep:
+    """Return all that a step of one point shows (see `whole_step`)."""
+    x1, y1, hit = _move_in_disc(settings, x, y, a, b)
+    return whole_step(settings, x1, y1, hit)
 
 
 @njit()

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from math import isfinite
+from math import isfinite, sqrt
 from typing import Any, ClassVar
 
 import gymnasium
@@ -13,6 +13,7 @@ from pbcs_ompl.core.batches import check_batch
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray, Transition
 from pbcs_ompl.envs import point_kernels
+from pbcs_ompl.envs.point_kernels import WholeStep
 from pbcs_ompl.envs.point_robot import PointRobot
 from pbcs_ompl.envs.rendering import rasterise
 
@@ -76,15 +77,19 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         self.goal_circle = None if self.goal is None else (*self.goal.tolist(), GOAL_RADIUS)
         goal_x, goal_y = (np.inf, np.inf) if self.goal is None else self.goal
         self.settings[point_kernels.GOAL_X], self.settings[point_kernels.GOAL_Y] = goal_x, goal_y
-        self._state = self.start.copy()
+        self._position: tuple[float, float] = (self.start[0].item(), self.start[1].item())
 
     @abstractmethod
     def move(self, states: Array, controls: Array) -> tuple[Array, BoolArray]:
         """Return the next states [B, 2] and whether a wall was hit [B]; the arguments are trusted."""
 
     @abstractmethod
-    def move_one(self, x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
-        """Return what `move` does, bit for bit, with one point (x, y) under the control (a, b): x, y, hit."""
+    def move_one(self, x: float, y: float, a: float, b: float) -> WholeStep:
+        """Return what `move` does, bit for bit, with one point (x, y) under the control (a, b).
+
+        Returns:
+            The next x and y, whether a wall was hit, the reward, whether the episode ends, the distance to the goal.
+        """
 
     @abstractmethod
     def compiled_step(self) -> CompiledStep | None:
@@ -117,23 +122,26 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         unknown = set(options or {}) - {"state"}
         if unknown:
             raise InvalidOption(f"reset options {sorted(unknown)}: the only option is 'state'")
-        self._state = self._checked("state", (options or {}).get("state", self.start))
-        return self._state.copy(), self._info(hit_wall=False)
+        self.set_env_state((options or {}).get("state", self.start))
+        x, y = self._position
+        dx, dy = x - self.settings[point_kernels.GOAL_X].item(), y - self.settings[point_kernels.GOAL_Y].item()
+        return self.get_env_state(), _info(False, sqrt(dx * dx + dy * dy))
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Move by `action` [2]; `info` has `is_success` = `success`, `hit_wall`, `distance_to_goal`."""
         control = np.asarray(action, dtype=np.float64).ravel().tolist()
         if len(control) != 2 or not (isfinite(control[0]) and isfinite(control[1])):
             check_batch("action", np.reshape(action, (1, -1)), 2, InvalidOption)  # raises, and says why
-        x, y, hit = self.move_one(*self._state.tolist(), *control)
-        reward, terminated, _ = point_kernels.outcome(self.settings, x, y, hit)
-        self._state = np.array([x, y])
-        return self._state.copy(), reward, terminated, False, self._info(hit_wall=hit)
+        x, y = self._position
+        x, y, hit, reward, terminated, distance = self.move_one(x, y, control[0], control[1])
+        self._position = x, y
+        observation = np.empty(2)
+        observation[0], observation[1] = x, y
+        return observation, reward, terminated, False, _info(hit, distance)
 
     def step_one(self, state: list[float], control: list[float]) -> list[float]:
         """Return the next state, bit-equal to `transition`. Nothing is checked; NaN gives NaN."""
-        x, y, _ = self.move_one(*state, *control)
-        return [x, y]
+        return list(self.move_one(*state, *control)[:2])
 
     def transition(self, states: Array, controls: Array) -> Transition:
         """Advance states [B, 2] by one step under controls [B, 2].
@@ -157,7 +165,7 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
 
     def get_env_state(self) -> Array:
         """Return the position [2]."""
-        return self._state.copy()
+        return np.array(self._position)
 
     def set_env_state(self, state: Array) -> None:
         """Put the point at `state` [2].
@@ -165,7 +173,8 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         Raises:
             InvalidState: the state is in a wall, outside, or not finite.
         """
-        self._state = self._checked("state", state)
+        x, y = self._checked("state", state).tolist()
+        self._position = x, y
 
     def observe(self, states: Array) -> Array:
         """Return the observations [B, 2] of states [B, 2]: the positions."""
@@ -185,12 +194,7 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         """Return the picture as an array [height, width, 3] of uint8, for "rgb_array"."""
         if self.render_mode is None:
             return None
-        return rasterise(float(self.state_high[0]), self.walls, self.goal_circle, self._state)
-
-    def _info(self, hit_wall: bool) -> dict[str, Any]:
-        distance = point_kernels.distance(self.settings, *self._state.tolist())
-        success = distance < GOAL_RADIUS
-        return {"is_success": success, "success": success, "hit_wall": hit_wall, "distance_to_goal": distance}
+        return rasterise(float(self.state_high[0]), self.walls, self.goal_circle, self.get_env_state())
 
     def _checked(self, name: str, point: Sequence[float] | Array) -> Array:
         try:
@@ -206,3 +210,8 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
         return state
 
     where_invalid = "inside a wall"
+
+
+def _info(hit_wall: bool, distance: float) -> dict[str, Any]:
+    success = distance < GOAL_RADIUS
+    return {"is_success": success, "success": success, "hit_wall": hit_wall, "distance_to_goal": distance}

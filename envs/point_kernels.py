@@ -5,6 +5,8 @@ import numpy as np
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array, BoolArray
 
+WholeStep = tuple[float, float, bool, float, bool, float]
+
 # Places of the settings in the array `settings`, which every kernel takes.
 LIMIT, SCALE, GOAL_X, GOAL_Y, GOAL_RADIUS, PENALTY, TERMINATE, FIRST_FREE = range(8)
 
@@ -49,6 +51,13 @@ def outcome(settings: Array, x: float, y: float, hit: bool) -> tuple[float, bool
     reached = distance(settings, x, y) < settings[GOAL_RADIUS]
     reward = (1.0 if reached else 0.0) + (settings[PENALTY] if hit else 0.0)
     return reward, reached and settings[TERMINATE] != 0.0, reached
+
+
+@njit()
+def whole_step(settings: Array, x: float, y: float, hit: bool) -> WholeStep:
+    """Return all that a step shows which ended in (x, y): x, y, hit, reward, terminated, distance to the goal."""
+    reward, terminated, _ = outcome(settings, x, y, hit)
+    return x, y, hit, reward, terminated, distance(settings, x, y)
 
 
 @njit()

@@ -23,10 +23,11 @@ if TYPE_CHECKING:
     from pbcs_ompl.resettable import ResetReport, check_resettable, make
     from pbcs_ompl.results.export import Export, export
     from pbcs_ompl.results.report import Report, write_report
-    from pbcs_ompl.skills import Evaluation, SkillChain, TrainResult, evaluate, resume, train
+    from pbcs_ompl.skills import DistillResult, Evaluation, SkillChain, TrainResult, distill, evaluate, resume, train
 
 __all__ = [
     "Comparison",
+    "DistillResult",
     "EnvSpec",
     "Evaluation",
     "Export",
@@ -39,6 +40,7 @@ __all__ = [
     "Trajectory",
     "check_resettable",
     "compare",
+    "distill",
     "evaluate",
     "export",
     "make",
@@ -58,7 +60,7 @@ _MODULES = {
     "resettable": ("ResetReport", "check_resettable", "make"),
     "results.export": ("Export", "export"),
     "results.report": ("Report", "write_report"),
-    "skills": ("Evaluation", "SkillChain", "TrainResult", "evaluate", "resume", "train"),
+    "skills": ("DistillResult", "Evaluation", "SkillChain", "TrainResult", "distill", "evaluate", "resume", "train"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 

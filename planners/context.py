@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, IndexArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +22,7 @@ class PlanningContext:
         steer: Returns controls [B, A] that lead from states [B, D] towards features [B, F]; None where there is no
             steering.
         control_durations: The least and the most steps that a control lasts.
+        periods: The period of each feature [F], 0 for one that has none; None where none has.
     """
 
     feature_low: Array
@@ -33,6 +34,24 @@ class PlanningContext:
     parallel_batch: int = 1
     steer: Callable[[Array, Array], Array] | None = None
     control_durations: tuple[int, int] = (1, 1)
+    periods: Array | None = None
+
+    def bins(self, name: str, given: Array | None) -> tuple[Array, IndexArray]:
+        """Return an edge length of bins for each feature [F], and how many bins are in its period [F], 0 without one.
+
+        The edge of a feature that has a period is the nearest one that divides it.
+
+        Args:
+            name, given: See `edge_lengths`.
+
+        Raises:
+            InvalidOption: `given` has another number of edges.
+        """
+        edges = self.edge_lengths(name, given)
+        periods = np.zeros(len(edges)) if self.periods is None else self.periods
+        turns = np.where(periods > 0.0, np.maximum(np.rint(periods / edges), 1.0), 0.0)
+        edges = np.where(periods > 0.0, periods / np.maximum(turns, 1.0), edges)
+        return edges, turns.astype(np.int64)
 
     def edge_lengths(self, name: str, given: Array | None) -> Array:
         """Return an edge length of bins for each feature [F].

@@ -34,8 +34,8 @@ class ESTCompiled(Strategy):
     def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
         """Begin without cells."""
         super().start(context, rng)
-        self._size = context.edge_lengths("bin_size", self._given_size)
-        self._grid = empty_grid(len(self._size))
+        self._size, turns = context.bins("bin_size", self._given_size)
+        self._grid = empty_grid(turns)
         self._weights = np.zeros(2 * len(self._grid.cells))
 
     def resolved(self) -> dict[str, Any]:

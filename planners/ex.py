@@ -39,8 +39,8 @@ class Ex(Strategy):
     def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
         """Begin without bins."""
         super().start(context, rng)
-        self._size = context.edge_lengths("bin_size", self._given_size)
-        self.queue = empty_queue(len(self._size))
+        self._size, turns = context.bins("bin_size", self._given_size)
+        self.queue = empty_queue(len(self._size), turns)
 
     def resolved(self) -> dict[str, Any]:
         """Return the edges of the bins."""

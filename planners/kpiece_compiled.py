@@ -35,8 +35,8 @@ class KPIECE1Compiled(Strategy):
     def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
         """Begin without cells."""
         super().start(context, rng)
-        self._size = context.edge_lengths("bin_size", self._given_size)
-        self._grid, self._judged = empty_grid(len(self._size)), kpiece_loop.none_judged()
+        self._size, turns = context.bins("bin_size", self._given_size)
+        self._grid, self._judged = empty_grid(turns), kpiece_loop.none_judged()
         self._selected: list[int] = []
 
     def resolved(self) -> dict[str, Any]:

@@ -147,6 +147,7 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
         self._rng = self._seeds.child("strategy").generator()
         self._propagator: BatchPropagator | None = None
         self._tree: Tree | None = None
+        self._solution: IndexArray | None = None
         self._problem: Any = None
         self._error: PbcsError | None = None
 
@@ -168,6 +169,11 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
     def tree(self) -> Tree | None:
         """The tree as arrays; None before `solve`."""
         return self._tree
+
+    @property
+    def solution(self) -> IndexArray | None:
+        """The nodes [T+1] of the path of the last `solve`, one a step; None unless it reached the goal."""
+        return self._solution
 
     @property
     def strategy(self) -> Strategy:
@@ -192,12 +198,12 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
     def clear(self) -> None:
         """Drop the tree."""
         super().clear()
-        self._tree = self._problem = None
+        self._tree = self._solution = self._problem = None
         self._error = None
 
     def solve(self, ptc: Any) -> Any:
         """Grow the tree until the goal, the budget's end, or `ptc` (a condition, a callable or seconds)."""
-        self._error = None
+        self._error = self._solution = None
         try:
             return ob.PlannerStatus(self._solve(_condition(ptc)))
         except PbcsError as error:
@@ -238,7 +244,8 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
             if propagator.counter.left == 0 or stop():
                 return ob.PlannerStatus.TIMEOUT
             reached = self._advance(propagator, tree, goal)
-        problem.addSolutionPath(propagator.path(tree, tree.path_to(reached)))
+        self._solution = tree.path_to(reached)
+        problem.addSolutionPath(propagator.path(tree, self._solution))
         return ob.PlannerStatus.EXACT_SOLUTION
 
     def _add_starts(self, propagator: BatchPropagator, goal: Any) -> int:

@@ -13,7 +13,6 @@ from pbcs_ompl.core.tree import Tree, resized_copy
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray, Transition
 from pbcs_ompl.planners.compiled import CompiledStep, step_of
 from pbcs_ompl.planners.context import PlanningContext
-from pbcs_ompl.planners.kernels import batch_loop
 
 
 class BatchPropagator(ABC):
@@ -105,7 +104,7 @@ class ModelPropagator(BatchPropagator):
         model = self._model
         return PlanningContext(model.feature_low, model.feature_high, model.bin_size, model.action_low,
                                model.action_high, model.max_episode_steps, model.parallel_batch,
-                               model.advance_towards, self._durations)
+                               model.advance_towards, self._durations, model.feature_periods)
 
     def new_tree(self) -> Tree:
         """Return an empty tree of states [D] and features [F]."""
@@ -140,6 +139,8 @@ class ModelPropagator(BatchPropagator):
 
     def _expand_compiled(self, compiled: CompiledStep, tree: Tree, nodes: IndexArray, controls: Array,
                          durations: IndexArray) -> int:
+        from pbcs_ompl.planners.kernels import batch_loop  # compiled when it is imported, and rarely used
+
         first, most = len(tree), min(self.counter.left, int(durations.sum()))
         tree.reserve(most)
         written, reached = batch_loop.expand(compiled.parameters, self.feature_dims, tree.columns, first, most,

@@ -58,8 +58,8 @@ class Rides(Strategy):
     def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
         """Begin without regions."""
         super().start(context, rng)
-        self._size = context.edge_lengths("bin_size", self._given_size)
-        self.regions = no_regions(len(self._size), self._scales)
+        self._size, turns = context.bins("bin_size", self._given_size)
+        self.regions = no_regions(len(self._size), self._scales, turns)
         self._bounds = np.array([context.action_low, context.action_high])
         self._yields = np.ones((QUESTIONS, max(self._scales, rides_loop.KINDS, rides_loop.PATIENCES), 3))
         self._rides = np.zeros((0, 10), np.int64)

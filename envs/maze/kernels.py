@@ -8,7 +8,7 @@ import numpy as np
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, displacement, outcome
+from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, WholeStep, displacement, outcome, whole_step
 from pbcs_ompl.envs.wall_grid import CELLS_PER_UNIT
 
 Point = tuple[float, float]
@@ -126,10 +126,11 @@ def _move(rectangles: Array, lists: IndexArray, settings: Array,
 
 
 @njit()
-def move_one(rectangles: Array, lists: IndexArray, settings: Array,
-             x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
-    """Return the next position of one point, and whether the step hit a wall."""
-    return _move(rectangles, lists, settings, x, y, a, b)
+def step_one(rectangles: Array, lists: IndexArray, settings: Array,
+             x: float, y: float, a: float, b: float) -> WholeStep:
+    """Return all that a step of one point shows (see `whole_step`)."""
+    x1, y1, hit = _move(rectangles, lists, settings, x, y, a, b)
+    return whole_step(settings, x1, y1, hit)
 
 
 @njit()

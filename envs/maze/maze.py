@@ -12,6 +12,7 @@ from pbcs_ompl.envs.maze import kernels
 from pbcs_ompl.envs.maze.fcl_move import move_by_fcl
 from pbcs_ompl.envs.maze.layout import MAZES_KEPT, MazeLayout
 from pbcs_ompl.envs.point_env import MAX_STEP, CompiledStep, PointEnv
+from pbcs_ompl.envs.point_kernels import WholeStep, whole_step
 from pbcs_ompl.envs.wall_grid import WallGrid, build_wall_grid
 from pbcs_ompl.envs.walls_fcl import WallsFcl
 
@@ -55,7 +56,7 @@ class MazeEnv(PointEnv):
         _check_choice("collision", collision, ("kernel", "fcl"))
         self.layout = _layout(size, maze_seed, layout)
         self.collision = collision
-        self._fcl = WallsFcl(self.layout.rectangles)
+        self._fcl = _fcl_of(self.layout)
         self._slide = collision_response == "slide"
         size = self.layout.size
         self._grid = _grid_of(self.layout)
@@ -76,13 +77,13 @@ class MazeEnv(PointEnv):
             return move_by_fcl(self._fcl, states, states + self.displacements(controls), self._slide)
         return kernels.move(self._grid.rectangles, self._grid.lists, self.settings, states, controls)
 
-    def move_one(self, x: float, y: float, a: float, b: float) -> tuple[float, float, bool]:
-        """Return what `move` does with one point."""
+    def move_one(self, x: float, y: float, a: float, b: float) -> WholeStep:
+        """Return what `move` does with one point, and what that shows."""
         if self.collision == "fcl":
             after, hits = self.move(np.array([[x, y]]), np.array([[a, b]]))
-            return float(after[0, 0]), float(after[0, 1]), bool(hits[0])
+            return whole_step(self.settings, float(after[0, 0]), float(after[0, 1]), bool(hits[0]))
         rectangles, lists, _ = self._grid
-        return kernels.move_one(rectangles, lists, self.settings, x, y, a, b)
+        return kernels.step_one(rectangles, lists, self.settings, x, y, a, b)
 
     def compiled_step(self) -> CompiledStep | None:
         """Return the step as a function for compiled planners; None with collision="fcl"."""
@@ -102,8 +103,13 @@ class MazeEnv(PointEnv):
             return super().render()
         goal = self.goal_circle
         marks = {} if goal is None else {(int(goal[0]), int(goal[1])): "G"}
-        marks[int(self._state[0]), int(self._state[1])] = "A"
+        marks[int(self._position[0]), int(self._position[1])] = "A"
         return "\n".join(self.layout.draw(marks)) + "\n"
+
+
+@lru_cache(MAZES_KEPT)
+def _fcl_of(layout: MazeLayout) -> WallsFcl:
+    return WallsFcl(layout.rectangles)
 
 
 @lru_cache(MAZES_KEPT)

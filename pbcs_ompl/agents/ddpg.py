@@ -4,6 +4,7 @@ Differs: losses are means over the mini-batch, not (half) sums; Adam does not se
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
@@ -11,7 +12,7 @@ import torch
 from torch import Tensor
 
 from pbcs_ompl.agents import losses
-from pbcs_ompl.agents.kernels.ddpg import Constants, Stack, update_many, update_one
+from pbcs_ompl.agents.kernels.ddpg import Constants, Stack, update_seed, update_seeds
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
 from pbcs_ompl.agents.networks import TrainedNetwork
 from pbcs_ompl.agents.replay import Batch
@@ -58,15 +59,24 @@ class DDPG(StackedAgent):
         critic_rates, actor_rates = self.adam_rates(first, len(rows))
         constants = Constants(self.box.half.numpy(), self.box.centre.numpy(), np.float32(self.settings.discount),
                               np.float32(1.0 - self.settings.polyak))
-        before = numba.get_num_threads()
-        threads = min(torch.get_num_threads(), before, len(self.seeds))
-        numba.set_num_threads(threads)
-        run = update_one if threads == 1 else update_many
-        run(rows.numpy(), torch.stack((actor_rates, critic_rates), dim=1).numpy(), _stack(self.actor, len(self.seeds)),
-            _stack(self.critic, len(self.seeds)), constants, filled)
-        numba.set_num_threads(before)
+        rates = torch.stack((actor_rates, critic_rates), dim=1).numpy()
+        actor, critic = _stack(self.actor, len(self.seeds)), _stack(self.critic, len(self.seeds))
+        threads = min(torch.get_num_threads(), numba.get_num_threads(), len(self.seeds))
+        if threads == 1:
+            for seed in range(len(self.seeds)):
+                update_seed(rows.numpy()[:, seed], rates, seed, actor, critic, constants, filled[:, seed])
+        else:
+            _in_threads(threads, rows.numpy(), rates, actor, critic, constants, filled)
         critic_losses, actor_losses = np.moveaxis(filled.astype(np.float64), 2, 0)
         return {"critic_loss": critic_losses, "actor_loss": actor_losses}
+
+
+def _in_threads(threads: int, *arguments: Any) -> None:
+    """Call `update_seeds` on that many threads."""
+    before = numba.get_num_threads()
+    numba.set_num_threads(threads)
+    update_seeds(*arguments)
+    numba.set_num_threads(before)
 
 
 def _stack(network: TrainedNetwork, seeds: int) -> Stack:

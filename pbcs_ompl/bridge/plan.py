@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,10 +11,12 @@ import gymnasium
 from ompl import base as ob
 
 from pbcs_ompl.bridge.coverage import Coverage, TransitionRecorder
+from pbcs_ompl.bridge.improve import Allowance, Improvement
+from pbcs_ompl.bridge.improve import improve as improve_plan
 from pbcs_ompl.bridge.planner_spec import PlannerSpec, as_batch_planner
 from pbcs_ompl.bridge.problem import CallbackState, Problem, make_problem
 from pbcs_ompl.bridge.termination import Limits, checked_limits, make_stop
-from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory
+from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory, trajectory_of
 from pbcs_ompl.bridge.tree import load_tree, save_tree, tree_of
 from pbcs_ompl.bridge.verification import Verification, verify
 from pbcs_ompl.core.callbacks import code_of_others
@@ -59,6 +61,8 @@ class PlanResult:
         trajectory: The path found, solved or not; None when none was.
         tree: What was explored.
         coverage: How much of the feature space was seen after how many transitions; None unless asked for.
+        improvement: What making the plan shorter has brought and used beside the search, whose numbers the others are;
+            None unless asked for.
     """
 
     solved: bool
@@ -78,13 +82,15 @@ class PlanResult:
     found: bool = False
     reason: str | None = None
     coverage: Coverage | None = None
+    improvement: Improvement | None = None
 
     def summary(self) -> dict[str, Any]:
         """Return the plain numbers and words, without settings and arrays."""
         return {"solved": self.solved, "found": self.found, "reason": self.reason, "transitions": self.transitions,
                 "collision_checks": self.collision_checks, "seconds": self.seconds, "nodes": self.nodes,
                 "path_length": self.path_length, "replay_ok": self.replay_ok, "planner": self.planner,
-                "env": self.env, "seed": self.seed, "out": self.out}
+                "env": self.env, "seed": self.seed, "out": self.out,
+                **({} if self.improvement is None else {"improvement": asdict(self.improvement)})}
 
 
 @checked
@@ -93,7 +99,8 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
          goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
          reset_options: dict[str, Any] | None = None, max_episode_steps: int | None = None, seed: int = 0,
          max_transitions: int = 1_000_000, max_seconds: float | None = None, out: str | Path | None = None,
-         coverage: bool = False, on_progress: ProgressCallback | None = None) -> PlanResult:
+         improve: int | str | None = None, coverage: bool = False,
+         on_progress: ProgressCallback | None = None) -> PlanResult:
     """Search a trajectory from the environment's start to its goal.
 
     A plan counts as solved once it has been executed in a fresh environment and reached the goal there. An unreachable
@@ -110,6 +117,8 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
         max_transitions: The most environment steps.
         max_seconds: The most wall time of the search; None for any.
         out: A new folder for config.toml, result.json, tree.npz and, when solved, trajectory.npz.
+        improve: What may be used after the search to make the plan shorter: 5000 transitions, "10%" of those of the
+            search, or "2s" of wall time; None for nothing.
         coverage: Report how much of the feature space was seen after how many transitions, in the result's `coverage`.
         on_progress: Called a few times a second with {"transitions", "seconds"}.
 
@@ -120,25 +129,27 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "E
         RunFolderError: `out` exists, is in use, or cannot be written.
     """
     limits = checked_limits(max_transitions, max_seconds)
+    allowance = None if improve is None else Allowance.of(improve)
     model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options,
                  max_episode_steps=max_episode_steps)
     spec = PlannerSpec(planner, planner_kwargs or {})
     config = {"kind": "plan", "planner": spec.name, "seed": seed, **limits._asdict(),
-              "environment": model.spec.to_dict(), "planner_kwargs": spec.options, "versions": planning_versions()}
+              "environment": model.spec.to_dict(), "planner_kwargs": spec.options, "versions": planning_versions(),
+              **({} if improve is None else {"improve": improve})}
     with _new_folder(out, config) as folder:
         _warm_up(model, spec, planner)
         recorder = TransitionRecorder(model) if coverage else None
         with quiet_ompl(), make_problem(model, seed=seed, counter=Counter(limits.max_transitions),
                                         recorder=recorder) as problem:
             found = _search(problem, spec, seed, limits, on_progress)
-        trajectory, transitions = found.trajectory, problem.callbacks.counter.count
-        verdict = NOTHING_FOUND if trajectory is None else verify(trajectory, model)
+        transitions = problem.callbacks.counter.count
+        trajectory, improvement, verdict = _judged(found, model, allowance, seed, transitions)
         result = PlanResult(
             solved=verdict.solved, found=trajectory is not None, reason=verdict.reason, transitions=transitions,
             collision_checks=transitions + problem.callbacks.validity_checks, seconds=found.seconds,
             nodes=len(found.tree), path_length=None if trajectory is None else trajectory.length,
-            replay_ok=verdict.replays,
-            planner=spec.name, env=model.spec.id, seed=seed, out=None if out is None else str(out),
+            replay_ok=verdict.replays, planner=spec.name, env=model.spec.id, seed=seed, improvement=improvement,
+            out=None if out is None else str(out),
             planner_settings=found.settings, trajectory=trajectory, tree=found.tree,
             coverage=None if recorder is None else recorder.coverage(found.tree, transitions, found.seconds))
         if folder is not None:
@@ -156,10 +167,27 @@ def read_plan(folder: str | Path) -> PlanResult:
     found = read_folder(path)
     trajectory = Trajectory.load(path / TRAJECTORY) if (path / TRAJECTORY).exists() else None
     try:
-        return PlanResult(**(found.result or {}), trajectory=trajectory, tree=load_tree(path / TREE),
+        numbers = dict(found.result or {})
+        improvement = Improvement(**numbers.pop("improvement")) if "improvement" in numbers else None
+        return PlanResult(**numbers, trajectory=trajectory, tree=load_tree(path / TREE), improvement=improvement,
                           planner_settings=found.config.get("planner_kwargs", {}))
     except TypeError as error:
         raise DamagedFile(f"{path / RESULT} is not the result of a plan: {error}") from error
+
+
+def _judged(found: "_Found", model: ResettableModel, allowance: Allowance | None, seed: int,
+            transitions: int) -> tuple[Trajectory | None, Improvement | None, Verification]:
+    """Return the plan, shorter where that is asked for and the environment grants the shorter one, and the verdict."""
+    given = found.trajectory
+    if given is None:
+        return None, None, NOTHING_FOUND
+    if allowance is None:
+        return given, None, verify(given, model)
+    shorter, improvement = improve_plan(given, model, allowance.after(transitions), seed=seed, tree=found.tree)
+    verdict = verify(shorter, model)
+    if verdict.solved or shorter is given:
+        return shorter, improvement, verdict
+    return given, replace(improvement, after=given.length), verify(given, model)
 
 
 PARTS = (TRAJECTORY, TREE)
@@ -222,7 +250,7 @@ def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
     callbacks.raise_error()
     with code_of_others(f"the planner {spec.name!r}"):
         tree = tree_of(planner, problem.space_information)
-        return _Found(_solution(problem, spec, seed), tree, spec.settings(planner), seconds)
+        return _Found(_solution(problem, batch_planner, spec, seed), tree, spec.settings(planner), seconds)
 
 
 def _keep_error(planner: BatchPlanner, callbacks: CallbackState) -> None:
@@ -232,13 +260,16 @@ def _keep_error(planner: BatchPlanner, callbacks: CallbackState) -> None:
         callbacks.fail(error)
 
 
-def _solution(problem: Problem, spec: PlannerSpec, seed: int) -> Trajectory | None:
+def _solution(problem: Problem, planner: BatchPlanner | None, spec: PlannerSpec, seed: int) -> Trajectory | None:
     """Return the planner's path if it ends in the goal: planners also report approximate ones."""
     setup, model = problem.setup, problem.model
     if not setup.haveExactSolutionPath():
         return None
-    trajectory = to_trajectory(setup.getSolutionPath(), problem.space_information, model, planner=spec.name,
-                               seed=seed, reset_seed=model.spec.reset_seed(seed))
+    source: dict[str, Any] = {"planner": spec.name, "seed": seed, "reset_seed": model.spec.reset_seed(seed)}
+    if planner is not None and planner.tree is not None and planner.solution is not None:
+        trajectory = trajectory_of(planner.tree, planner.solution, model, **source)
+    else:
+        trajectory = to_trajectory(setup.getSolutionPath(), problem.space_information, model, **source)
     reached = model.goal_distance(trajectory.states[-1:])[0] < model.goal_threshold
     return trajectory if reached else None
 

@@ -14,6 +14,7 @@ from pbcs_ompl.core.errors import DamagedFile, InvalidOption, Mismatch, MissingD
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import path_control, value_reader
 from pbcs_ompl.core.plain import plain
+from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.actions import ActionMap, Actions
@@ -289,6 +290,35 @@ def to_trajectory(path: Any, space_information: Any, model: ResettableModel, *, 
     held = held.reshape(len(steps), len(model.action_low))
     states, controls = _every_state(model, ends, held, steps), np.repeat(held, steps, axis=0)
     rewards = model.transition(states[:-1], controls).rewards if len(steps) else np.empty(0)
+    return from_controls(model, states, controls, rewards, planner=planner, seed=seed, reset_seed=reset_seed)
+
+
+def trajectory_of(tree: Tree, nodes: IndexArray, model: ResettableModel, *, planner: str = "", seed: int = 0,
+                  reset_seed: int | None = None) -> Trajectory:
+    """Return the trajectory through nodes of a tree whose every edge is one step.
+
+    It is that of the PathControl through the same nodes, which takes ten times as long to read.
+
+    Args:
+        tree: A tree with controls.
+        nodes: From a root to a leaf [T+1], each the parent of the next.
+        model: The environment.
+        planner, seed, reset_seed: Kept in the trajectory.
+    """
+    return from_controls(model, tree.states[nodes], tree.controls[nodes[1:]], tree.rewards[nodes[1:]], planner=planner,
+                         seed=seed, reset_seed=reset_seed)
+
+
+def from_controls(model: ResettableModel, states: Array, controls: Array, rewards: Array, *, planner: str = "",
+                  seed: int = 0, reset_seed: int | None = None) -> Trajectory:
+    """Return the trajectory of a model along states [T+1, D] under controls [T, A], as they are, true or not.
+
+    Args:
+        model: The environment.
+        states, controls: The states [T+1, D], the first is the start, and the controls between them [T, A].
+        rewards: The rewards [T].
+        planner, seed, reset_seed: Kept in the trajectory.
+    """
     actions = controls if model.env is None else ActionMap.of(model.env.action_space).to_actions(controls)
     return Trajectory(environment=model.spec, states=states, actions=actions,
                       rewards=np.asarray(rewards, dtype=np.float64), planner=planner, seed=seed, reset_seed=reset_seed)

@@ -4,6 +4,7 @@ Exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 somethin
 4 a mistake in pbcs itself, 128+n stopped by signal n (130 for Ctrl-C, 141 for a pipe that was closed).
 """
 
+import gc
 import sys
 import traceback
 import warnings
@@ -15,6 +16,7 @@ from typing import Any
 
 from pbcs_ompl.cli.arguments import build_parser, parse
 from pbcs_ompl.cli.streams import OutputClosed, flush_output, print_error, survive_encodings
+from pbcs_ompl.core.collector import no_collection
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.formatting import one_line
 from pbcs_ompl.core.signals import interruptible, signal_of, signals_interrupt
@@ -31,7 +33,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     survive_encodings()
     with warnings.catch_warnings():
         warnings.showwarning = _warn
-        return _run(words)
+        try:
+            return _run(words)
+        finally:
+            gc.unfreeze()  # else OMPL's bindings list all that they hold as leaked at exit
 
 
 def _run(words: list[str]) -> int:
@@ -70,8 +75,9 @@ def _dispatch(words: list[str]) -> int:
 def _import(verb: str) -> ModuleType:
     """Return the module of a verb; a signal waits, since an exception within an import of OMPL ends the process."""
     stops: list[KeyboardInterrupt] = []
-    with interruptible(stops.append):
+    with interruptible(stops.append), no_collection():
         module = import_module(f"pbcs_ompl.cli.{verb}")
+    gc.freeze()  # what was imported stays: no collection needs to look at it
     if stops:
         raise stops[0]
     return module

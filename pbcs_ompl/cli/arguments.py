@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from pbcs_ompl.cli.streams import print_output
-from pbcs_ompl.cli.values import choice, fraction, integer, json_object, json_objects, part, seconds
+from pbcs_ompl.cli.values import amount, choice, fraction, integer, json_object, json_objects, part, seconds
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
@@ -71,7 +71,7 @@ def build_parser() -> Parser:
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
-    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export):
+    for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export, _distill):
         name, purpose = add.__name__.removeprefix("_"), add.__doc__ or ""
         verb = group.add_parser(name, help=purpose, description=purpose)
         add(verb)
@@ -133,7 +133,12 @@ def _plan(verb: Parser) -> None:
     _add_seed(verb)
     _add_budget(verb, 1_000_000)
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop after this much wall time")
+    _add_improve(verb)
     verb.add_argument("--video", metavar="FILE", help="film the path that was found; .mp4 or .gif")
+    verb.add_argument("--follow", metavar="FOLLOWER",
+                      help="let a robot's follower drive along the plan, smoothed: a folder of pbcs train, or ant")
+    verb.add_argument("--episodes", type=integer(1), metavar="N", help="of --follow: number of executions (30)")
+    verb.add_argument("--epsilon", type=fraction, metavar="X", help="of --follow: fraction of random actions (0)")
     _add_out(verb)
     verb.add_argument("--no-pictures", action="store_true", help="write no tree.png, which takes half a second")
 
@@ -196,6 +201,7 @@ def _compare(verb: Parser) -> None:
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop a run after this much wall time")
     verb.add_argument("--max-memory", type=integer(1), metavar="MB",
                       help="kill a run whose process holds more; Python and the libraries take about 250")
+    _add_improve(verb)
     _add_execution(verb)
     _add_out(verb)
 
@@ -251,6 +257,16 @@ def _export(verb: Parser) -> None:
     _add_trust(verb, "the folder")
 
 
+def _distill(verb: Parser) -> None:
+    """train one network to do what a chain of skills does"""
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train")
+    verb.add_argument("--settings", type=json_object, default={}, metavar="JSON",
+                      help="settings that differ from the defaults, such as '{\"width\": 64}'")
+    _add_seed(verb)
+    _add_out(verb)
+    _add_trust(verb, "the folder")
+
+
 def _add_execution(verb: Parser) -> None:
     verb.add_argument("--jobs", type=integer(1), metavar="J",
                       help="runs side by side (1, or all processors of a cluster); more than there are cores makes the "
@@ -288,6 +304,12 @@ def _add_seed(verb: Parser) -> None:
 def _add_budget(verb: Parser, default: int) -> None:
     verb.add_argument("--max-transitions", type=integer(1), default=default, metavar="N",
                       help=f"stop after N environment steps ({default:,})")
+
+
+def _add_improve(verb: Parser) -> None:
+    verb.add_argument("--improve", type=amount, metavar="AMOUNT",
+                      help="make the plan shorter afterwards: with 5000 transitions, 10%% of those of the search, "
+                           "or in 2s")
 
 
 def _add_trust(verb: Parser, source: str) -> None:

@@ -23,7 +23,7 @@ def finished_plan(arguments: Namespace, out: Path) -> PlanResult | None:
     asked = {"kind": "plan", "planner": arguments.planner, "seed": arguments.seed,
              "max_transitions": arguments.max_transitions, "environment": environment(arguments).to_dict()}
     same = all(config.get(name) == value for name, value in asked.items())
-    same &= config.get("max_seconds") == arguments.max_seconds
+    same &= all(config.get(name) == getattr(arguments, name) for name in ("max_seconds", "improve"))
     used = config.get("planner_kwargs", {})
     same &= all(used.get(name) == value for name, value in arguments.planner_kwargs.items())
     if not same:

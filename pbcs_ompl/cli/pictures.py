@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pbcs_ompl.cli.terminal import warn
 from pbcs_ompl.core.callbacks import describe
+from pbcs_ompl.core.collector import no_collection
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
@@ -19,9 +20,11 @@ if TYPE_CHECKING:
 def draw(name: str, picture: Callable[[], Any], out: Path) -> None:
     """Write the figure that `picture` returns to out/name, or say in one line on stderr why not."""
     try:
-        from pbcs_ompl.figures.canvas import save
+        with no_collection():
+            from pbcs_ompl.figures.canvas import save
 
-        save(picture(), out / name)
+            figure = picture()
+        save(figure, out / name)
     except PbcsError as error:
         warn(f"no picture {name}: {error}")
     except Exception as error:  # of matplotlib, or of the environment
@@ -54,7 +57,10 @@ def draw_chain(model: ResettableModel, chain: "TrainedController", trajectory: A
 
 
 def draw_comparison(comparison: "Comparison", title: str, out: Path) -> None:
-    """Draw compare.png, the distribution of the transitions to the goal, and coverage.png, how it grew."""
+    """Draw compare.png, the distribution of the transitions to the goal, and coverage.png, how it grew.
+
+    Where plans were made shorter, also length.png.
+    """
     def picture(name: str) -> Any:
         from pbcs_ompl.figures import compare
 
@@ -62,3 +68,5 @@ def draw_comparison(comparison: "Comparison", title: str, out: Path) -> None:
 
     draw("compare.png", lambda: picture("distribution_figure"), out)
     draw("coverage.png", lambda: picture("coverage_figure"), out)
+    if any(record.get("improvement") for record in comparison.runs):
+        draw("length.png", lambda: picture("length_figure"), out)

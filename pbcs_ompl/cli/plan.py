@@ -17,10 +17,15 @@ from pbcs_ompl.results.command_line import command, environment_words
 
 
 def run(arguments: Namespace) -> int:
-    """Plan, draw, report. Returns 1 when the environment does not grant the goal to a plan."""
+    """Plan, draw, report. Returns 1 when the environment does not grant the goal: to a plan, or to a follower."""
     out = Path(arguments.out or fresh_folder("plan", arguments.env, arguments.planner, arguments.seed))
     model = make(environment(arguments))
     note_rules(model)
+    driver = None
+    if arguments.follow or arguments.episodes or arguments.epsilon is not None:
+        from pbcs_ompl.cli.plan_follow import Driver  # here, because of torch
+
+        driver = Driver.of(arguments, model)
     if arguments.video:
         from pbcs_ompl.figures.video import check_video  # here, because matplotlib takes a third of a second
 
@@ -32,15 +37,20 @@ def run(arguments: Namespace) -> int:
         from pbcs_ompl.figures.video import write_video
 
         write_video(model, result.trajectory.states, arguments.video)
-    print_summary(result.summary(), _closing_lines(arguments, result, out), as_json=arguments.json)
-    return 0 if result.solved else 1
+    summary, lines, done = result.summary(), _closing_lines(arguments, result, out), result.solved
+    if driver is not None and result.solved and result.trajectory is not None:
+        followed = driver.drive(result.trajectory)
+        summary, lines = summary | {"followed": followed.summary()}, [*lines[:-2], driver.words(followed), *lines[-2:]]
+        done = followed.success_rate > 0
+    print_summary(summary, lines, as_json=arguments.json)
+    return 0 if done else 1
 
 
 def _plan(arguments: Namespace, model: ResettableModel, out: Path) -> PlanResult:
     with ProgressDisplay("plan", budget=arguments.max_transitions, max_seconds=arguments.max_seconds) as display:
         return plan(model, arguments.planner, planner_kwargs=arguments.planner_kwargs, seed=arguments.seed,
                     max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds, out=out,
-                    on_progress=display)
+                    improve=arguments.improve, on_progress=display)
 
 
 def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[tuple[str, str]]:
@@ -50,6 +60,10 @@ def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[
     lines = [("solved" if result.solved else "not solved", effort), ("tree", f"{format_number(result.nodes)} nodes")]
     if result.solved:
         lines.append(("path", f"{format_number(result.path_length)} steps, verified in a fresh environment"))
+        if result.improvement is not None:
+            lines.append(("before", f"{format_number(result.improvement.before)} steps; improved with "
+                                    f"{format_number(result.improvement.transitions)} transitions, "
+                                    f"{format_duration(result.improvement.seconds)}"))
         words = environment_words(environment(arguments))
         following = command(["train", *words, "--path", str(out)])
     elif result.found:

@@ -1,32 +1,21 @@
 """What a human sees: progress with rates, a closing summary; and what a script reads: one JSON line."""
 
 import json
+import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
-
-from rich.console import Console, RenderableType
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
+from typing import TYPE_CHECKING, Any
 
 from pbcs_ompl.cli.streams import print_error, print_output
 from pbcs_ompl.core.formatting import format_duration, format_number, one_line, printable
 from pbcs_ompl.core.plain import plain
 
+if TYPE_CHECKING:
+    from pbcs_ompl.cli.bar import Bar
+
 SECONDS_BETWEEN_LINES = 10.0
-
-
-class _Bar(Progress):
-    """A progress bar with a table under it."""
-
-    table: Table | None = None
-
-    def get_renderables(self) -> Iterable[RenderableType]:
-        yield from super().get_renderables()
-        if self.table is not None:
-            yield self.table
 
 
 class ProgressDisplay:
@@ -46,14 +35,11 @@ class ProgressDisplay:
     def __init__(self, label: str, *, count: str = "transitions", budget: int | None = None,
                  max_seconds: float | None = None):
         self._label, self._count, self._budget, self._max_seconds = label, count, budget, max_seconds
-        console = Console(stderr=True, highlight=False)
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
-        self._bar = _Bar(*columns, console=console, transient=True) if console.is_terminal else None
+        self._bar = _bar(label)
 
     def __enter__(self) -> "ProgressDisplay":
         self._start = self._last_line = time.monotonic()
         if self._bar is not None:
-            self._task = self._bar.add_task(self._label, total=None)
             self._bar.start()
         return self
 
@@ -68,9 +54,7 @@ class ProgressDisplay:
         share = self._share(numbers, seconds)
         text = f"{self._label}: {self._describe(numbers, seconds, share)}"
         if self._bar is not None:
-            total = None if share is None else 1.0
-            self._bar.update(self._task, description=text, total=total, completed=share or 0)
-            self._bar.table = _table(numbers.get("table", []))
+            self._bar.show(text, share, numbers.get("table", []))
         elif now - self._last_line > SECONDS_BETWEEN_LINES:
             self._last_line = now
             rows = ("  " + ", ".join(f"{name} {format_number(value)}" for name, value in row.items())
@@ -96,16 +80,13 @@ class ProgressDisplay:
         return ", ".join(parts)
 
 
-def _table(rows: Sequence[dict[str, Any]]) -> Table | None:
-    """Return a table with a column for each key of the rows; None without rows."""
-    if not rows:
+def _bar(label: str) -> "Bar | None":
+    """Return a live bar where the standard error is a terminal."""
+    if sys.stderr is None or not sys.stderr.isatty():
         return None
-    table = Table(box=None, pad_edge=False)
-    for name, value in rows[0].items():
-        table.add_column(name, justify="left" if isinstance(value, str) else "right")
-    for row in rows:
-        table.add_row(*map(format_number, row.values()))
-    return table
+    from pbcs_ompl.cli.bar import Bar
+
+    return Bar(label)
 
 
 def print_summary(result: dict[str, Any], lines: Sequence[tuple[str, str]], *, as_json: bool) -> None:

@@ -33,6 +33,16 @@ def seconds(text: str) -> float:
     return value
 
 
+def amount(text: str) -> int | str:
+    """Read transitions as 5000, a share as 10%, or seconds as 2s."""
+    if text[-1:] not in ("%", "s"):
+        return integer(1)(text)
+    value = _number(text[:-1])
+    if not (isfinite(value) and value > 0):
+        raise ArgumentTypeError(f"expected transitions as 5000, a share as 10%, or seconds as 2s, got {text!r}")
+    return text
+
+
 def fraction(text: str) -> float:
     """Read a number from 0 to 1."""
     value = _number(text)

@@ -64,25 +64,31 @@ def _hints(owner: Hashable) -> dict[str, Any]:
 
 def fits(value: Any, hint: Any) -> bool:
     """Return whether a value has the type of an annotation, as far as that can be seen."""
+    return _test_of(hint)(value)
+
+
+@cache
+def _test_of(hint: Any) -> Callable[[Any], bool]:
+    """Return the test of an annotation, which is taken apart once."""
     origin, parameters = get_origin(hint), get_args(hint)
     if hint is Any or isinstance(hint, TypeVar) or getattr(hint, "_is_protocol", False):
-        return True
+        return lambda value: True
     if hint is None or hint is NoneType:
-        return value is None
+        return lambda value: value is None
     if origin in (Union, UnionType):
-        return any(fits(value, one) for one in parameters)
+        return lambda value: any(fits(value, one) for one in parameters)
     if origin is Literal:
-        return value in parameters
+        return lambda value: value in parameters
     if origin is not None and issubclass(origin, Mapping):
-        return isinstance(value, origin) and all(
+        return lambda value: isinstance(value, origin) and all(
             fits(key, parameters[0]) and fits(item, parameters[1]) for key, item in value.items())
     if origin is not None and issubclass(origin, Sequence) and origin is not tuple:
-        listed = isinstance(value, (origin, *_of_numpy("ndarray"))) and not isinstance(value, str | bytes)
-        return listed and all(fits(item, parameters[0]) for item in value)
-    return _has_class(value, origin or hint)
+        return lambda value: _is_list(value, origin) and all(fits(item, parameters[0]) for item in value)
+    return lambda value: _has_class(value, origin or hint)
 
 
 def _has_class(value: Any, kind: Any) -> bool:
+    """Return whether a value is an instance; numbers of NumPy are numbers, and booleans are none."""
     if kind is Callable:
         return callable(value)
     if kind in NUMBERS:
@@ -90,6 +96,10 @@ def _has_class(value: Any, kind: Any) -> bool:
     if kind is bool:
         return _is_bool(value)
     return isinstance(value, kind)
+
+
+def _is_list(value: Any, kind: type) -> bool:
+    return isinstance(value, (kind, *_of_numpy("ndarray"))) and not isinstance(value, str | bytes)
 
 
 def _is_bool(value: Any) -> bool:

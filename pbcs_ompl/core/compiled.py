@@ -10,9 +10,12 @@ from typing import Any, TypeVar
 
 import numba
 
+from pbcs_ompl.core.announcement import announce
+from pbcs_ompl.core.collector import no_collection
 from pbcs_ompl.core.scratch import scratch_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+announce()
 
 
 def njit(*signature: Any, **options: Any) -> Callable[[Function], Function]:
@@ -47,7 +50,8 @@ def _cached(function: Function, *signature: Any, **options: Any) -> Function:
     name = function.__qualname__
     function.__qualname__ = f"{name}-{kernel_digest()}"
     try:
-        compiled: Function = numba.njit(*signature, cache=True, **options)(function)
+        with no_collection():  # the first one loads the half of Numba
+            compiled: Function = numba.njit(*signature, cache=True, no_cfunc_wrapper=True, **options)(function)
     finally:
         function.__qualname__ = name
     return compiled

@@ -12,7 +12,7 @@ import numpy as np
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.tree import Tree
-from pbcs_ompl.core.types import Array, BoolArray, Capability, Counter, Transition
+from pbcs_ompl.core.types import Array, BoolArray, Capability, Counter, IndexArray, Transition
 
 
 class ResettableModel(Protocol):
@@ -30,6 +30,7 @@ class ResettableModel(Protocol):
         feature_low, feature_high: Bounds of the explored feature [F], finite.
         feature_dims: The state dimensions that are the feature, when it is a selection of them, else None.
         bin_size: Suggested edge length of exploration bins along each feature dimension [F].
+        feature_periods: The period of each feature dimension, as 2 pi for an angle that turns freely; 0 for none [F].
         goal_threshold: A state is a success if and only if `goal_distance < goal_threshold`.
         max_episode_steps: Length of an episode: the limit, where there is one, else a suggestion.
         episode_limit: Steps after which the environment cuts an episode off; None where it has no limit.
@@ -51,6 +52,7 @@ class ResettableModel(Protocol):
     feature_high: Array
     feature_dims: tuple[int, ...] | None
     bin_size: Array
+    feature_periods: Array
     observation_size: int
     goal_threshold: float
     max_episode_steps: int
@@ -154,6 +156,11 @@ class BatchPlanner(Protocol):
     @property
     def tree(self) -> Tree | None:
         """The tree as arrays; None before `solve`."""
+        ...
+
+    @property
+    def solution(self) -> IndexArray | None:
+        """The nodes [T+1] of the tree from a root to the goal, one a step; None unless the last `solve` reached it."""
         ...
 
     @property

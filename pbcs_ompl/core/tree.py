@@ -10,7 +10,7 @@ from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 GROWTH = 4
 """Rows that were never written to cost address space, but no memory; copies cost both memory and time."""
 FIRST_ROWS = 1 << 14
-MOST_RESERVED = 1 << 30
+MOST_RESERVED = 1 << 31
 """Bytes of address space that a tree may reserve in advance."""
 
 
@@ -144,10 +144,9 @@ class Tree:
 
     def path_to(self, node: int) -> IndexArray:
         """Return the nodes from a root to `node`, both included."""
-        parents = self.columns.parents
-        path = [int(node)]
-        while parents[path[-1]] >= 0:
-            path.append(int(parents[path[-1]]))
+        parent_of, path = self.columns.parents.item, [int(node)]
+        while (parent := parent_of(path[-1])) >= 0:
+            path.append(parent)
         return np.array(path[::-1], dtype=np.int64)
 
     def __getstate__(self) -> dict[str, Any]:

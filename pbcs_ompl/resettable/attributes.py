@@ -44,6 +44,8 @@ class EnvAttributes:
     goal_threshold: float | None = _optional("goes with `goal_distance`", "a success is a smaller distance")
     feature_dims: tuple[int, ...] | None = _optional("all", "the dimensions of the state that are explored")
     bin_size: Array | None = _optional("extent / 20", "edge length of exploration bins, one or [F]")
+    feature_periods: Array | None = _optional(
+        "none", "the period of each feature [F], as 2 pi for an angle that turns freely; 0 for one without")
     max_episode_steps: int | None = _optional("as registered, else 1000", "length of an episode")
     parallel_batch: int | None = _optional("1", "how many states keep all cores busy in one `transition`")
     distance: Callable[[Array, Array], Array] | None = _optional(
@@ -72,7 +74,8 @@ class EnvAttributes:
             value = vars(self)[name]
             whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
             _require(name, value, value is None or (whole and value >= 1), "a positive integer")
-        for name in ("state_low", "state_high", "bin_size", "walls", "goal_circle", "feature_dims"):
+        for name in ("state_low", "state_high", "bin_size", "feature_periods", "walls", "goal_circle",
+                     "feature_dims"):
             value = vars(self)[name]
             _require(name, value, value is None or np.asarray(value).dtype.kind in "iuf", "numbers")
         threshold = self.goal_threshold

@@ -9,7 +9,7 @@ import numpy as np
 from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.resettable.observations import flat_bounds
-from pbcs_ompl.resettable.rules import observed_dims
+from pbcs_ompl.resettable.rules import selected_dims
 
 EXPLORED_STEPS = 500
 GOAL_RESETS = 30
@@ -124,7 +124,7 @@ def _entries(named: list[Any], key: str) -> Array | None:
 def _declared(seen: _Seen, space: Any, rule: str | None) -> tuple[Array, Array]:
     """Return the bounds [F] that the observation space has for the features; NaN where it has none."""
     low, high = flat_bounds(space)
-    chosen = None if rule is None else observed_dims(rule, len(low))
+    chosen = None if rule is None else selected_dims(rule, "obs", len(low))
     places = _columns(seen.features, seen.observations) if chosen is None else chosen
     return (np.array([np.nan if place is None else low[place] for place in places]),
             np.array([np.nan if place is None else high[place] for place in places]))

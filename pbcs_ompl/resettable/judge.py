@@ -101,11 +101,13 @@ class Judge:
             CallbackFailed: the environment raised.
         """
         episode = _Episode(self._make_env(), self._spec, self._rule, reset_seed)
+        own = np.array(actions)  # whose rows the environment may change
         try:
-            for action in actions:
-                if episode.ending is not None:
-                    break
-                episode.step(action)
+            with code_of_others("the environment"):
+                for action in own:
+                    if episode.ending is not None:
+                        break
+                    episode.advance(action)
         finally:
             close(episode.env)
         return episode.execution("end of the actions", observed=True)
@@ -151,7 +153,8 @@ class _Episode:
         self._rewards: list[float] = []
         with code_of_others("the environment"):
             observation, info = env.reset(seed=spec.reset_seed(reset_seed), options=deepcopy(spec.reset_options))
-            outcome = Outcome(env.unwrapped, observation, math.nan, False, info)
+            self._bare = env.unwrapped
+            outcome = Outcome(self._bare, observation, math.nan, False, info)
             if rule(outcome):
                 self.ending = "goal"
             self._observations = [flat(observation)]
@@ -164,10 +167,15 @@ class _Episode:
     def step(self, action: Any) -> None:
         """Make one step with a copy of an action."""
         with code_of_others("the environment"):
-            observation, reward, terminated, truncated, info = self.env.step(np.array(action)[()])
-            success = self._rule(Outcome(self.env.unwrapped, observation, float(reward), bool(terminated), info))
-            self._rewards.append(float(reward))
-            self._observations.append(flat(observation))
+            self.advance(np.array(action)[()])
+
+    def advance(self, action: Any) -> None:
+        """Make one step with an action, which the environment may change; what it raises passes."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        gained = float(reward)
+        success = self._rule(Outcome(self._bare, observation, gained, bool(terminated), info))
+        self._rewards.append(gained)
+        self._observations.append(flat(observation))
         if success:
             self.ending = "goal"
         elif terminated or truncated:

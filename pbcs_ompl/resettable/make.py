@@ -3,9 +3,10 @@
 import inspect
 import os
 import sys
+from collections.abc import Mapping
 from contextlib import redirect_stderr
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from io import StringIO
 from typing import Any
@@ -185,9 +186,14 @@ def _check_options(spec: registration.EnvSpec, kwargs: dict[str, Any]) -> None:
     creator: Any = spec.entry_point
     if isinstance(creator, str):
         creator = registration.load_env_creator(creator)
-    parameters = inspect.signature(creator).parameters
+    parameters = _parameters(creator)
     if any(p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters.values()):
         return
     for name in kwargs:
         if name not in parameters:
             raise InvalidOption(f"{spec.id} has no option {name!r}{did_you_mean(name, parameters)}")
+
+
+@cache
+def _parameters(creator: Any) -> Mapping[str, inspect.Parameter]:
+    return inspect.signature(creator).parameters

@@ -42,6 +42,7 @@ class Model:
         self.feature_low, self.feature_high = self.state_low[self._dims], self.state_high[self._dims]
         extent = self.feature_high - self.feature_low
         self.bin_size: Array = np.asarray(extent / 20.0 if offers.bin_size is None else offers.bin_size, np.float64)
+        self.feature_periods = _periods(offers.feature_periods, self._dims)
         self.observation_size = int(env.observation_space.shape[0])
         self.max_episode_steps = int(offers.max_episode_steps or DEFAULT_EPISODE_STEPS)
         self.parallel_batch = int(offers.parallel_batch or 1)
@@ -110,6 +111,17 @@ class Model:
             raise InvalidOption(f"{self.spec.id} cannot be steered: it has no `advance_towards(states, "
                                 f"targets)`; choose another planner")
         return self._offers.advance_towards(states, targets)
+
+
+def _periods(given: Array | None, dims: list[int]) -> Array:
+    """Return the period of each feature [F], 0 for none."""
+    if given is None:
+        return np.zeros(len(dims))
+    periods = np.asarray(given, dtype=np.float64)
+    if periods.shape != (len(dims),) or not (np.isfinite(periods) & (periods >= 0.0)).all():
+        raise InvalidOption(f"feature_periods={periods.tolist()}: expected a period, or 0, for each of the {len(dims)} "
+                            f"features")
+    return periods
 
 
 def _bounds(env: Any, low: Array, high: Array) -> tuple[Array, Array]:

@@ -19,6 +19,8 @@ def flat(observation: Any) -> Array:
     The entries of a dictionary follow each other in the order of their names, those of a tuple in their order; each
     element of a `Discrete` space is one number (`gymnasium.wrappers.FlattenObservation` makes one-hot vectors of them).
     """
+    if isinstance(observation, np.ndarray) and observation.ndim == 1:
+        return observation.astype(np.float64)
     if isinstance(observation, dict | tuple):
         return np.concatenate([EMPTY, *_leaves(observation)])
     return np.array(observation, dtype=np.float64).ravel()

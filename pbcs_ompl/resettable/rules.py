@@ -124,12 +124,12 @@ def feature_rule(rule: str) -> FeatureRule:
     return lambda outcome: np.concatenate([_read("feature", rule, values, outcome) for values in chosen])
 
 
-def observed_dims(rule: str, size: int) -> Sequence[int] | None:
-    """Return which numbers of an observation of `size` a feature rule selects, in order; None if it reads others."""
+def selected_dims(rule: str, source: str, size: int) -> Sequence[int] | None:
+    """Return which of the `size` numbers of a source a feature rule selects, in order; None if it reads others."""
     if _is_function(rule):
         return None
     chosen = parse_values(rule, EXAMPLES["feature"])
-    if any(values.source != "obs" or values.absolute for values in chosen):
+    if any(values.source != source or values.absolute for values in chosen):
         return None
     return [dim for values in chosen for dim in range(size)[values.part]]
 

@@ -15,7 +15,7 @@ from pbcs_ompl.core.formatting import is_printable
 from pbcs_ompl.core.plain import plain
 
 Words = list[str]
-BUDGETS = ("max_transitions", "max_seconds", "max_memory")
+BUDGETS = ("max_transitions", "max_seconds", "max_memory", "improve")
 
 
 def command(words: Sequence[str]) -> str:
@@ -94,6 +94,15 @@ def eval_words(folder: str | Path, *, episodes: int | None = None, epsilon: floa
     options = {"--episodes": episodes, "--epsilon": epsilon}
     return ["eval", str(folder), *(word for name, value in options.items() if value is not None
                                    for word in (name, str(value))), *_trust(trust)]
+
+
+def distill_words(config: dict[str, Any]) -> Words:
+    """Return the words of a distillation; none where it is not known which chain it was made from."""
+    if not config["chain"]:
+        return []
+    trust = bool(EnvSpec.from_dict(config["environment"]).modules)
+    return ["distill", config["chain"], "--seed", str(config["seed"]), *_json_words("--settings", config["settings"]),
+            *_trust(trust)]
 
 
 def compare_words(config: dict[str, Any]) -> Words:

@@ -36,7 +36,26 @@ class PlanConfig(Budgets):
     planner_kwargs: Table
     seed: Count
     environment: EnvValues
+    improve: NotRequired[Positive | str]
     versions: NotRequired[Versions]
+
+
+class ProgressOfImprovement(TypedDict):
+    """How the length of a plan fell."""
+
+    transitions: list[Count]
+    seconds: list[Seconds]
+    length: list[Count]
+
+
+class Improvement(TypedDict):
+    """What making a plan shorter has brought and used."""
+
+    before: Count
+    after: Count
+    transitions: Count
+    seconds: Seconds
+    progress: ProgressOfImprovement
 
 
 class TrainConfig(TypedDict):
@@ -86,6 +105,7 @@ class CompareConfig(Budgets):
     environments: list[EnvValues]
     seeds: list[Count]
     versions: Versions
+    improve: NotRequired[Positive | str]
 
 
 class StudyConfig(TypedDict):
@@ -96,8 +116,17 @@ class StudyConfig(TypedDict):
     seeds: NotRequired[Positive]
 
 
+class DistillConfig(TypedDict):
+    """config.toml of a distillation."""
+
+    chain: str
+    settings: Table
+    seed: Count
+    environment: EnvValues
+
+
 CONFIGS: dict[str, Any] = {"plan": PlanConfig, "train": TrainConfig, "eval": EvalConfig, "compare": CompareConfig,
-                           "study": StudyConfig, "follower": FollowerConfig}
+                           "study": StudyConfig, "follower": FollowerConfig, "distill": DistillConfig}
 """What config.toml holds, by its `kind`: the verb that wrote it, or the result of `pbcs train --lines`."""
 
 
@@ -111,6 +140,7 @@ class PlanResult(TypedDict):
     nodes: Count
     path_length: Count | None
     replay_ok: bool | None
+    improvement: NotRequired[Improvement]
 
 
 class TrainResult(TypedDict):
@@ -146,6 +176,20 @@ class EvalResult(TypedDict):
     epsilon: Share
 
 
+class DistillResult(TypedDict):
+    """result.json of a distillation."""
+
+    solved: bool
+    success_rate: Share
+    wilson: Interval
+    teacher_success_rate: Share
+    teacher_wilson: Interval
+    rounds: Count
+    transitions: Count
+    updates: Count
+    seconds: Seconds
+
+
 class Claim(TypedDict):
     """What a study says of one claim."""
 
@@ -165,7 +209,7 @@ class StudyResult(TypedDict):
 
 
 RESULTS: dict[str, Any] = {"plan": PlanResult, "train": TrainResult, "eval": EvalResult, "compare": Table,
-                           "study": StudyResult, "follower": FollowerResult}
+                           "study": StudyResult, "follower": FollowerResult, "distill": DistillResult}
 """What result.json holds; a comparison is read from its records."""
 Provenance = list[Versions]
 
@@ -197,6 +241,7 @@ class RunOfComparison(TypedDict):
     coverage: Share | None
     progress: Progress | None
     planner_settings: Table | None
+    improvement: NotRequired[Improvement | None]
 
 
 class RunOfStudy(TypedDict):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import GROWTH, resized_copy
+from pbcs_ompl.core.types import IndexArray
 from pbcs_ompl.planners.kernels.cells import cell_of, find_cell, rehash
 from pbcs_ompl.planners.kernels.memory import uncounted
 from pbcs_ompl.planners.kernels.runs import (
@@ -57,6 +58,8 @@ class BinQueue(NamedTuple):
     """First free slice of each size, -1 for none [CLASSES]."""
     used: NDArray[np.int64]
     """Pool rows ever used, and log2 of the largest slice [2]."""
+    turns: IndexArray
+    """Bins in a period of each feature [F]; 0 for a feature without."""
 
     @property
     def num_bins(self) -> int:
@@ -77,19 +80,20 @@ _vector = types.int32[::1]
 _heads, _runs = (numba.from_dtype(kind)[::1] for kind in (HEAD, RUN))
 _totals = types.int64[::1]
 QUEUE_TYPE = types.NamedTuple((_vector, _heads, _vector, _heads, _runs, _totals, _integers, _vector, _vector,
-                               _totals), BinQueue)
+                               _totals, _totals), BinQueue)
 """Numba's type of BinQueue."""
 
 
-def empty_queue(num_features: int) -> BinQueue:
-    """Return a queue without bins; its rows cost no memory until they are written to."""
+def empty_queue(num_features: int, turns: IndexArray | None = None) -> BinQueue:
+    """Return a queue without bins, with `turns` bins in a period; its rows cost no memory until they are written to."""
     bins, rows, totals = 1 << 10, 1 << 14, np.zeros(2, np.int64)
     totals[FREE_RUN] = -1
     return BinQueue(
         pool=np.empty(rows, np.int32), heads=np.empty(bins, HEAD), order=np.empty(bins, np.int32),
         head=np.zeros(1, HEAD), runs=np.empty(rows, RUN), totals=totals,
         cells=np.empty((bins, num_features), np.int64), table=np.zeros(4 * bins, np.int32),
-        free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64))
+        free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64),
+        turns=np.zeros(num_features, np.int64) if turns is None else turns)
 
 
 def insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.bool_], size: NDArray[np.float64],
@@ -177,7 +181,7 @@ def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.boo
     cell = np.empty(features.shape[1], np.int64)
     for row in range(len(features)):
         if not skip[row]:
-            cell_of(features, row, size, cell)
+            cell_of(features, row, size, queue.turns, cell)
             place = find_cell(cells, table, cell)
             if not add(pool, heads, queue.runs, queue.totals, table[place] - 1, first + row):
                 grow_and_add(queue, cell, place, first + row)

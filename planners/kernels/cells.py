@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbcs_ompl.core.compiled import njit
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.kernels.runs import Number
 
 FARTHEST = 4.6e18  # cells beyond this coordinate are one cell: int64 ends there
@@ -14,10 +14,28 @@ PROBE = 17
 
 
 @njit(inline="always", error_model="numpy")
-def cell_of(features: Array, row: Number, size: Array, cell: NDArray[np.int64]) -> None:
-    """Write the coordinates floor(feature / size) of features[row] into the first F of `cell`."""
+def cell_of(features: Array, row: Number, size: Array, turns: IndexArray, cell: NDArray[np.int64]) -> None:
+    """Write the coordinates floor(feature / size) of features[row] into the first F of `cell`.
+
+    Of a feature with a period they are taken modulo the cells of a period, which is what `turns` [F] has; 0 for others.
+    """
     for axis in range(len(size)):
         cell[axis] = int(min(max(np.floor(features[row, axis] / size[axis]), -FARTHEST), FARTHEST))
+        if turns[axis] > 0:
+            cell[axis] %= turns[axis]
+
+
+@njit(inline="always")
+def step_aside(cell: NDArray[np.int64], axis: int, side: int, turns: IndexArray, scale: Number) -> Number:
+    """Move `cell` to its neighbour along an axis, at a scale of 2**scale cells; return where it was.
+
+    A cell is its own neighbour where it is the only one of a period.
+    """
+    before: Number = np.int64(cell[axis])
+    cell[axis] += side
+    if turns[axis] > 0:
+        cell[axis] %= ((turns[axis] - 1) >> scale) + 1
+    return before
 
 
 @njit(inline="always")

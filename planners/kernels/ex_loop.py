@@ -94,7 +94,7 @@ def expand(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Index
             if not finite(states, node):
                 return child - first, False
             if not terminal:
-                cell_of(features, node, bin_size, cell)
+                cell_of(features, node, bin_size, queue.turns, cell)
                 place = find_cell(cells, places, cell)
                 if not add(pool, heads, runs, totals, places[place] - 1, node):
                     grow_and_add(queue, cell, place, node)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import GROWTH, resized_copy
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.kernels.cells import cell_of, find_cell, rehash
 from pbcs_ompl.planners.kernels.runs import Members, Number
 from pbcs_ompl.planners.kernels.slices import CLASSES, SMALLEST, double, rows_needed, take
@@ -34,19 +34,21 @@ class Grid(NamedTuple):
     used: NDArray[np.int64]
     totals: NDArray[np.int64]
     """Cells and nodes [2]."""
+    turns: IndexArray
+    """Cells in a period of each feature [F]; 0 for a feature without."""
 
 
 GRID_TYPE = types.NamedTuple((types.int64[:, ::1], types.int32[::1], numba.from_dtype(SLICE)[::1], types.int32[::1],
-                              types.int32[::1], types.int64[::1], types.int64[::1]), Grid)
+                              types.int32[::1], types.int64[::1], types.int64[::1], types.int64[::1]), Grid)
 """Numba's type of Grid."""
 
 
-def empty_grid(num_features: int) -> Grid:
-    """Return a grid without cells."""
+def empty_grid(turns: IndexArray) -> Grid:
+    """Return a grid without cells, with `turns` [F] cells in a period."""
     cells, rows = 1 << 10, 1 << 14
-    return Grid(np.empty((cells, num_features), np.int64), np.zeros(4 * cells, np.int32), np.empty(cells, SLICE),
+    return Grid(np.empty((cells, len(turns)), np.int64), np.zeros(4 * cells, np.int32), np.empty(cells, SLICE),
                 np.empty(rows, np.int32), np.full(CLASSES, -1, np.int32), np.zeros(2, np.int64),
-                np.zeros(2, np.int64))
+                np.zeros(2, np.int64), turns)
 
 
 def reserve(grid: Grid, count: int) -> Grid:
@@ -67,7 +69,7 @@ def reserve(grid: Grid, count: int) -> Grid:
 def put(grid: Grid, features: Array, node: int, size: Array, cell: NDArray[np.int64]) -> tuple[Number, bool]:
     """Add a node to its cell, whose coordinates are left in `cell` [F]; return the cell, and whether it is new."""
     slices, pool, free, used, totals = grid.slices, grid.pool, grid.free, grid.used, grid.totals
-    cell_of(features, node, size, cell)
+    cell_of(features, node, size, grid.turns, cell)
     place = find_cell(grid.cells, grid.table, cell)
     number = np.int64(grid.table[place]) - 1
     opened = bool(number < 0)

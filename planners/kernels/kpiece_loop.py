@@ -12,7 +12,7 @@ from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import GROWTH, Columns, resized_copy
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.planners.compiled import PARAMETERS_TYPE
-from pbcs_ompl.planners.kernels.cells import cell_of, find_cell
+from pbcs_ompl.planners.kernels.cells import cell_of, find_cell, step_aside
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE
 from pbcs_ompl.planners.kernels.grid import CELLS, GRID_TYPE, NODES, Grid, put
 from pbcs_ompl.planners.kernels.memory import uncounted
@@ -126,12 +126,14 @@ def _meet_neighbours(grid: Grid, judged: Judged, number: Number, cell: NDArray[n
     known[number].neighbours = 0
     for axis in range(axes):
         for side in (-1, 1):
-            cell[axis] += side
+            before = step_aside(cell, axis, side, grid.turns, 0)
             other = np.int64(grid.table[find_cell(grid.cells, grid.table, cell)]) - 1
-            cell[axis] -= side
+            cell[axis] = before
             if other < 0:
                 continue
             known[number].neighbours += 1
+            if other == number:
+                continue
             known[other].neighbours += 1
             _judge(judged, other)
             if known[other].neighbours == 2 * axes:
@@ -205,7 +207,7 @@ def note(grid: Grid, judged: Judged, features: Array, nodes: IndexArray, number:
     cells = np.empty((len(nodes), axes), np.int64)
     most, dull = 2 * grid.totals[NODES] // (3 * grid.totals[CELLS]), True
     for k in range(len(nodes)):
-        cell_of(features, nodes[k], size, cells[k])
+        cell_of(features, nodes[k], size, grid.turns, cells[k])
         there = np.int64(grid.table[find_cell(grid.cells, grid.table, cells[k])]) - 1
         if there < 0 or grid.slices[there].length <= most:
             dull = False

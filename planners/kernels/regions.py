@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.tree import GROWTH, resized_copy
-from pbcs_ompl.planners.kernels.cells import find_cell, rehash
+from pbcs_ompl.core.types import IndexArray
+from pbcs_ompl.planners.kernels.cells import find_cell, rehash, step_aside
 from pbcs_ompl.planners.kernels.ranking import (
     FREE_RUN,
     LOWEST,
@@ -54,6 +55,8 @@ class Regions(NamedTuple):
     used: NDArray[np.int64]
     cell: NDArray[np.int64]
     """Where a cell is computed [F + 1]."""
+    turns: IndexArray
+    """Bins in a period of each feature [F]; 0 for a feature without."""
 
     @property
     def nbytes(self) -> int:
@@ -66,12 +69,12 @@ class Regions(NamedTuple):
 _rows = types.int32[:, ::1]
 _regions, _runs = (numba.from_dtype(kind)[::1] for kind in (REGION, RUN))
 REGIONS_TYPE = types.NamedTuple((_regions, types.int64[:, ::1], types.int32[::1], _rows, _runs, _rows, types.int64[::1],
-                                 types.int32[::1], types.int32[::1], types.int64[::1], types.int64[::1]), Regions)
+                                 types.int32[::1], types.int32[::1], *3 * (types.int64[::1],)), Regions)
 """Numba's type of Regions."""
 
 
-def no_regions(num_features: int, scales: int) -> Regions:
-    """Return the arrays without regions; their rows cost no memory until they are written to."""
+def no_regions(num_features: int, scales: int, turns: IndexArray | None = None) -> Regions:
+    """Return the arrays without regions, with `turns` bins [F] in a period; rows not written to cost no memory."""
     most, pool = 1 << 12, 1 << 14
     tails = np.zeros((scales, 2), np.int32)
     tails[:, LOWEST] = -1
@@ -82,7 +85,7 @@ def no_regions(num_features: int, scales: int) -> Regions:
         table=_table(most), order=np.empty((scales, most), np.int32),
         runs=np.empty(most, RUN), tails=tails, totals=totals, pool=np.empty(pool, np.int32),
         free=np.full(CLASSES, -1, np.int32), used=np.zeros(2, np.int64),
-        cell=np.zeros(1 + num_features, np.int64))
+        cell=np.zeros(1 + num_features, np.int64), turns=np.zeros(num_features, np.int64) if turns is None else turns)
 
 
 def reserve(regions: Regions, nodes: int, bins: int) -> Regions:
@@ -136,7 +139,7 @@ def add_node(rows: Any, pool: Members, free: NDArray[np.int32], used: NDArray[np
 @njit(inline="always")
 def open_bin(regions: Regions, cell: NDArray[np.int64]) -> Number:
     """Open the bin of `cell` [F + 1] (overwritten), and the regions around it that are not open; return its number."""
-    rows, cells, table, order, runs, tails, totals, pool, free, used, _ = regions
+    rows, cells, table, order, runs, tails, totals, pool, free, used, _, turns = regions
     features, opened = len(cell) - 1, np.int64(totals[REGIONS])
     inner = np.int64(-1)
     for scale in range(len(order)):
@@ -153,7 +156,7 @@ def open_bin(regions: Regions, cell: NDArray[np.int64]) -> Number:
             rows[number].parent = rows[number].child = rows[number].sibling = -1
             rows[number].count = rows[number].length = 0
             enter(order, runs, tails, totals, rows, scale, number)
-            _meet_neighbours(rows, cells, table, order, runs, tails, totals, scale, number, cell)
+            _meet_neighbours(rows, cells, table, order, runs, tails, totals, scale, number, cell, turns)
         if inner >= 0:
             rows[inner].parent, rows[inner].sibling = number, rows[number].child
             rows[number].child = inner
@@ -169,17 +172,19 @@ def open_bin(regions: Regions, cell: NDArray[np.int64]) -> Number:
 @njit(inline="always")
 def _meet_neighbours(rows: Any, cells: NDArray[np.int64], table: NDArray[np.int32], order: Rows, runs: Any,
                      tails: Rows, totals: NDArray[np.int64], scale: Number, number: Number,
-                     cell: NDArray[np.int64]) -> None:
+                     cell: NDArray[np.int64], turns: IndexArray) -> None:
     """Count the neighbours of a new region that are not open; those that it surrounds, and itself, rise."""
     missing = 2 * (len(cell) - 1)
     for axis in range(len(cell) - 1):
         for side in (-1, 1):
-            cell[axis] += side
+            before = step_aside(cell, axis, side, turns, scale)
             place = find_cell(cells, table, cell)
-            cell[axis] -= side
+            cell[axis] = before
             other = np.int64(table[place]) - 1
-            if other >= 0:
-                missing -= 1
+            if other < 0:
+                continue
+            missing -= 1
+            if other != number:
                 rows[other].missing -= 1
                 if rows[other].missing == 0:
                     lift(order, runs, tails, totals, rows, scale, other, key_of(rows, other))

@@ -161,7 +161,7 @@ def note(regions: Regions, yields: Array, rides: IndexArray, count: int, columns
     for node in range(first, last):
         number, opened = NO_BIN, False
         if not ends[node]:
-            cell_of(features, node, bin_size, cell)
+            cell_of(features, node, bin_size, regions.turns, cell)
             cell[len(bin_size)] = 0
             number = np.int64(regions.table[find_cell(regions.cells, regions.table, cell)]) - 1
             if number < 0:
@@ -207,7 +207,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
     states, features, controls, parents, rewards, ends = uncounted(columns)
     regions, yields, rides, actions = uncounted(regions), uncounted(yields), uncounted(rides), uncounted(actions)
     bounds, bin_size, feature_dims = uncounted(bounds), uncounted(bin_size), uncounted(feature_dims)
-    rows, cells, places, order, runs, tails, totals, pool, free, used, cell = regions
+    rows, cells, places, order, runs, tails, totals, pool, free, used, cell, turns = regions
     for child in range(first, first + most):
         if totals[REGIONS] + len(order) > len(rows):
             return child - first, False
@@ -224,7 +224,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
             return child + 1 - first, False
         number, opened = NO_BIN, False
         if not terminal:
-            cell_of(features, child, bin_size, cell)
+            cell_of(features, child, bin_size, turns, cell)
             cell[len(bin_size)] = 0
             number = np.int64(places[find_cell(cells, places, cell)]) - 1
             if number < 0:

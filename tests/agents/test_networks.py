@@ -67,7 +67,8 @@ def test_kernels_equal_torch_for_every_seed_of_a_stack(sizes: tuple[int, ...]) -
         start = kernels.outputs_offset(sizes, batch)
         np.testing.assert_allclose(values[start:], outputs[seed].numpy().ravel(), rtol=1e-5, atol=1e-5)
         grads[start:] = grad[seed].numpy().ravel()
-        kernels.backward(sizes, flat.numpy(), seeds, seed, values, grads, batch, own, True)
+        kernels.backward(sizes, flat.numpy(), seeds, seed, values, grads.copy(), batch, own)
+        kernels.backward(sizes, flat.numpy(), seeds, seed, values, grads, batch, np.empty(0, np.float32))
         expected = [part[seed].numpy().ravel() for layer in gradient.layers for part in layer[:2]]
         np.testing.assert_allclose(own, np.concatenate(expected), rtol=1e-4, atol=1e-5)
         down = grads[: batch * sizes[0]]

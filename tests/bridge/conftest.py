@@ -26,7 +26,7 @@ class Square:
         self.feature_low, self.feature_high = np.zeros(2), np.full(2, 5.0)
         self.feature_dims, self.bin_size = feature_dims, np.full(2, 0.25)
         self.observation_size, self.goal_threshold, self.max_episode_steps = size, radius, 100
-        self.parallel_batch, self.episode_limit = 1, None
+        self.parallel_batch, self.episode_limit, self.feature_periods = 1, None, np.zeros(2)
         self.walls, self.goal_circle = np.array([[2.0, 0.0, 2.2, 3.0]]), (goal, goal, radius)
         self.goal, self.start = np.array([goal, goal]), start
 

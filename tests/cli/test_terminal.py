@@ -65,7 +65,8 @@ def test_a_table_without_a_terminal_is_a_line_for_each_row(capsys, monkeypatch):
 
 def test_a_table_on_a_terminal_stands_under_the_bar(monkeypatch):
     screen = Console(file=io.StringIO(), force_terminal=True, no_color=True, width=100)
-    monkeypatch.setattr("pbcs_ompl.cli.terminal.Console", lambda **_: screen)
+    monkeypatch.setattr("pbcs_ompl.cli.bar.Console", lambda **_: screen)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     with ProgressDisplay("compare", count="runs", budget=8) as display:
         display({"runs": 3, "table": TABLE})
     plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", screen.file.getvalue())

@@ -32,7 +32,7 @@ class Square:
     env, spec, capabilities = None, EnvSpec("tests/Square"), frozenset({"visited", "arbitrary", "exact"})
     observation_size, max_episode_steps, parallel_batch = 2, 50, 1
     episode_limit: int | None = None
-    walls, goal_circle = np.empty((0, 4)), None
+    walls, goal_circle, feature_periods = np.empty((0, 4)), None, np.zeros(2)
     feature_dims: tuple[int, ...] | None = (0, 1)
 
     def __init__(self, extent: float = 3.0, goal: float = 2.7, radius: float = 0.3, terminal: bool = True,

@@ -8,7 +8,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def njit(function: Function) -> Function: ...
 @overload
 def njit(*signature: Any, cache: bool = ..., parallel: bool = ..., fastmath: Any = ..., inline: str = ...,
-         nogil: bool = ..., boundscheck: bool = ..., error_model: str = ...) -> Callable[[Function], Function]: ...
+         nogil: bool = ..., boundscheck: bool = ..., error_model: str = ...,
+         no_cfunc_wrapper: bool = ...) -> Callable[[Function], Function]: ...
 
 prange = range
 

@@ -8,6 +8,8 @@ from numba import prange
 from pbcs_ompl.agents.kernels import network as nets
 from pbcs_ompl.core.compiled import njit
 
+# What `update_seed` runs through is inlined in it: LLVM optimises a function again in each of its callers.
+
 
 class Stack(NamedTuple):
     """A `TrainedNetwork` in plain arrays [S * P]."""
@@ -42,22 +44,19 @@ class Scratch(NamedTuple):
     targets: np.ndarray
 
 
-def _update(rows: np.ndarray, rates: np.ndarray, actor: Stack, critic: Stack, constants: Constants,
-            losses: np.ndarray) -> None:
-    """Make K updates of S seeds.
+@njit()
+def update_seed(rows: np.ndarray, rates: np.ndarray, seed: int, actor: Stack, critic: Stack,
+                constants: Constants, losses: np.ndarray) -> None:
+    """Make K updates of one seed.
 
     Args:
-        rows: Mini-batches [K, S, B, W], see `Replay.unpack`.
+        rows: Its mini-batches [K, B, W], see `Replay.unpack`.
         rates: [K, 2, 2], see `adam_rates`; the actor's first.
-        losses: Filled with the critic's and the actor's losses [K, S, 2].
+        seed: Which one.
+        actor, critic: The networks of all seeds.
+        constants: What does not change.
+        losses: Filled with the critic's and the actor's losses [K, 2].
     """
-    for seed in prange(rows.shape[1]):
-        _update_seed(rows[:, seed], rates, seed, actor, critic, constants, losses[:, seed])
-
-
-@njit()
-def _update_seed(rows: np.ndarray, rates: np.ndarray, seed: int, actor: Stack, critic: Stack,
-                 constants: Constants, losses: np.ndarray) -> None:
     scratch = _scratch(actor, critic, rows.shape[1])
     for k in range(rows.shape[0]):
         losses[k, 0] = _critic_gradient(rows[k], seed, actor, critic, constants, scratch)
@@ -70,7 +69,7 @@ def _update_seed(rows: np.ndarray, rates: np.ndarray, seed: int, actor: Stack, c
         nets.polyak_update(critic.sizes, critic.weights, critic.target, critic.seeds, seed, constants.tau)
 
 
-@njit()
+@njit(inline="always")
 def _scratch(actor: Stack, critic: Stack, batch: int) -> Scratch:
     long, short = nets.num_activations(critic.sizes, batch), nets.num_activations(actor.sizes, batch)
     return Scratch(np.empty(short, np.float32), np.empty(short, np.float32),
@@ -79,7 +78,7 @@ def _scratch(actor: Stack, critic: Stack, batch: int) -> Scratch:
                    np.empty(len(critic.weights) // critic.seeds, np.float32), np.empty(batch, np.float32))
 
 
-@njit()
+@njit(inline="always")
 def _act(actor: Stack, flat: np.ndarray, seed: int, observations: np.ndarray, constants: Constants,
          activations: np.ndarray, obs_actions: np.ndarray) -> None:
     """Run the actor `flat` on observations [B, O].
@@ -101,7 +100,7 @@ def _act(actor: Stack, flat: np.ndarray, seed: int, observations: np.ndarray, co
             obs_actions[item * (width + actions) + width + a] = constants.centre[a] + constants.half[a] * squashed
 
 
-@njit()
+@njit(inline="always")
 def _critic_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, constants: Constants,
                      scratch: Scratch) -> float:
     batch, pair = rows.shape[0], critic.sizes[0]
@@ -120,12 +119,12 @@ def _critic_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, c
         loss += error * error
         scratch.critic_grads[out + item] = error * np.float32(2.0 / batch)
     nets.backward(critic.sizes, critic.weights, critic.seeds, seed, activations, scratch.critic_grads, batch,
-                  scratch.critic_gradient, False)
+                  scratch.critic_gradient)
     mean: float = loss / batch
     return mean
 
 
-@njit()
+@njit(inline="always")
 def _actor_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, constants: Constants,
                     scratch: Scratch) -> float:
     batch, size, pair = rows.shape[0], actor.sizes[0], critic.sizes[0]
@@ -137,7 +136,7 @@ def _actor_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, co
         loss -= activations[out + item]
         scratch.critic_grads[out + item] = np.float32(-1.0 / batch)
     nets.backward(critic.sizes, critic.weights, critic.seeds, seed, activations, scratch.critic_grads, batch,
-                  np.empty(0, np.float32), True)
+                  np.empty(0, np.float32))
     out, actions = nets.outputs_offset(actor.sizes, batch), pair - size
     for item in range(batch):
         for a in range(actions):
@@ -145,10 +144,14 @@ def _actor_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, co
             grad = scratch.critic_grads[item * pair + size + a] * constants.half[a]
             scratch.actor_grads[out + item * actions + a] = grad * (np.float32(1.0) - squashed * squashed)
     nets.backward(actor.sizes, actor.weights, actor.seeds, seed, scratch.actor_activations, scratch.actor_grads,
-                  batch, scratch.actor_gradient, False)
+                  batch, scratch.actor_gradient)
     mean: float = loss / batch
     return mean
 
 
-update_one = njit()(_update)
-update_many = njit(parallel=True)(_update)
+@njit(parallel=True)
+def update_seeds(rows: np.ndarray, rates: np.ndarray, actor: Stack, critic: Stack, constants: Constants,
+                 losses: np.ndarray) -> None:
+    """Make K updates of S seeds in parallel; `rows` [K, S, B, W] and `losses` [K, S, 2] are those of all seeds."""
+    for seed in prange(rows.shape[1]):
+        update_seed(rows[:, seed], rates, seed, actor, critic, constants, losses[:, seed])

@@ -24,6 +24,7 @@ EDGE = 8
 """Edge of the blocks of a transposition."""
 
 Flat = types.Array(types.float32, 1, "C")
+_int = types.int64
 _INDEX, _FLOAT = ir.IntType(64), ir.FloatType()
 
 
@@ -119,7 +120,7 @@ def _transpose_block(typing: Any, a: Any, a0: Any, a_row: Any, b: Any, b0: Any, 
     return signature, emit
 
 
-@njit()
+@njit(types.void(Flat, _int, Flat, _int, _int, _int))
 def transpose(a: np.ndarray, a0: int, b: np.ndarray, b0: int, rows: int, columns: int) -> None:
     """B [columns, rows] = A^T for A [rows, columns], both contiguous. The last blocks overlap others."""
     if rows < EDGE or columns < EDGE:
@@ -134,7 +135,27 @@ def transpose(a: np.ndarray, a0: int, b: np.ndarray, b0: int, rows: int, columns
             _transpose_block(a, a0 + i * columns + j, columns, b, b0 + j * rows + i, rows)
 
 
-@njit()
+@njit(types.void(Flat, _int, _int, _int, Flat, _int, Flat, _int, _int, _int, _int))
+def _wide_product(a: np.ndarray, a0: int, a_row: int, a_column: int, b: np.ndarray, b0: int, c: np.ndarray,
+                  c0: int, m: int, n: int, k: int) -> None:
+    if m < ROWS:
+        for i in range(m):
+            for j in range(0, n, LANES):
+                j = min(j, n - LANES)
+                _line_1(a, a0 + i * a_row, a_row, a_column, b, b0 + j, n, c, c0 + i * n + j, n, k)
+        return
+    double = n // (2 * LANES) * 2 * LANES
+    for i in range(0, m, ROWS):
+        i = min(i, m - ROWS)
+        left, out = a0 + i * a_row, c0 + i * n
+        for j in range(0, double, 2 * LANES):
+            _tile_2(a, left, a_row, a_column, b, b0 + j, n, c, out + j, n, k)
+        for j in range(double, n, LANES):
+            j = min(j, n - LANES)
+            _tile_1(a, left, a_row, a_column, b, b0 + j, n, c, out + j, n, k)
+
+
+@njit(types.void(Flat, _int, _int, _int, Flat, _int, Flat, _int, types.UniTuple(_int, 3)))
 def product(a: np.ndarray, a0: int, a_row: int, a_column: int, b: np.ndarray, b0: int, c: np.ndarray, c0: int,
             shape: tuple[int, int, int]) -> None:
     """C [m, n] = A B for shape (m, n, k); A has any strides, B [k, n] and C are contiguous.
@@ -154,23 +175,3 @@ def product(a: np.ndarray, a0: int, a_row: int, a_column: int, b: np.ndarray, b0
     for i in range(m):
         for j in range(n):
             c[c0 + i * n + j] = wide[i * LANES + j]
-
-
-@njit()
-def _wide_product(a: np.ndarray, a0: int, a_row: int, a_column: int, b: np.ndarray, b0: int, c: np.ndarray,
-                  c0: int, m: int, n: int, k: int) -> None:
-    if m < ROWS:
-        for i in range(m):
-            for j in range(0, n, LANES):
-                j = min(j, n - LANES)
-                _line_1(a, a0 + i * a_row, a_row, a_column, b, b0 + j, n, c, c0 + i * n + j, n, k)
-        return
-    double = n // (2 * LANES) * 2 * LANES
-    for i in range(0, m, ROWS):
-        i = min(i, m - ROWS)
-        left, out = a0 + i * a_row, c0 + i * n
-        for j in range(0, double, 2 * LANES):
-            _tile_2(a, left, a_row, a_column, b, b0 + j, n, c, out + j, n, k)
-        for j in range(double, n, LANES):
-            j = min(j, n - LANES)
-            _tile_1(a, left, a_row, a_column, b, b0 + j, n, c, out + j, n, k)

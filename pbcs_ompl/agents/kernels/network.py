@@ -85,13 +85,14 @@ def _relu_backward(grads: np.ndarray, values: np.ndarray) -> None:
 
 @njit(fastmath=FAST)
 def backward(sizes: Sizes, flat: np.ndarray, seeds: int, seed: int, activations: np.ndarray, grads: np.ndarray,
-             batch: int, gradient: np.ndarray, to_inputs: bool) -> None:
-    """Propagate the outputs' gradients back, to the inputs if `to_inputs`; fill `gradient` [P] unless it is empty."""
+             batch: int, gradient: np.ndarray) -> None:
+    """Propagate the outputs' gradients back and fill `gradient` [P]; to the inputs instead where it is empty."""
+    to_inputs = len(gradient) == 0
     below = outputs_offset(sizes, batch)
     for layer in range(len(sizes) - 2, -1, -1):
         fan_in, fan_out = sizes[layer], sizes[layer + 1]
         out, below = below, below - batch * fan_in
-        if len(gradient):
+        if not to_inputs:
             weight, bias = parameter_offsets(sizes, layer, 1, 0)
             product(activations, below, 1, fan_in, grads, out, gradient, weight, (fan_in, fan_out, batch))
             _add_rows(grads[out : out + batch * fan_out].reshape(batch, fan_out), gradient[bias : bias + fan_out])

@@ -1,5 +1,6 @@
 """Adapters for environments that keep all of their state in one place: classic control, and `get_env_state`."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from pbcs_ompl.resettable.memory.memory import Memory
 from pbcs_ompl.resettable.rules import FeatureRule, feature_rule
 from pbcs_ompl.resettable.task_env import bare
 
+ANGLES = {"PendulumEnv": (0,), "AcrobotEnv": (0, 1)}
+"""Which numbers of a state are angles that turn freely; CartPole's ends the episode before it has turned."""
 TUPLE = 1.0
 """Stands for the width where the state is a tuple of numbers."""
 
@@ -43,7 +46,15 @@ class AttributeEnv(RestorableEnv):
 
     def default_feature(self) -> FeatureRule:
         """Return the whole of the state."""
-        return feature_rule("state")
+        return feature_rule(self.usual_rule())
+
+    def usual_rule(self) -> str:
+        """Return the whole of the state."""
+        return "state"
+
+    def angles(self) -> tuple[str, int, Sequence[int]]:
+        """Return the angles of a pendulum."""
+        return "state", len(self.inner.state), ANGLES.get(type(bare(self.inner)).__name__, ())
 
     def save(self) -> Array:
         """Return the other attributes that change, the numbers of the state, and their width in bytes."""

@@ -3,6 +3,7 @@
 import math
 import os
 import warnings
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -60,10 +61,20 @@ class MujocoEnv(RestorableEnv):
 
     def default_feature(self) -> FeatureRule:
         """Return the achieved goal where there is one, else the first two positions."""
+        return feature_rule(self.usual_rule())
+
+    def usual_rule(self) -> str:
+        """Return the achieved goal where there is one, else the first two positions."""
         space = bare(self.inner).observation_space
         if isinstance(space, gymnasium.spaces.Dict) and "achieved_goal" in space.spaces:
-            return feature_rule("achieved_goal")
-        return feature_rule("qpos[0:2]" if self._simulation.model.nq > 1 else "qpos[0]")
+            return "achieved_goal"
+        return "qpos[0:2]" if self._simulation.model.nq > 1 else "qpos[0]"
+
+    def angles(self) -> tuple[str, int, Sequence[int]]:
+        """Return the positions of hinges without limits."""
+        model, hinge = self._simulation.model, int(self._mujoco.mjtJoint.mjJNT_HINGE)
+        free = (model.jnt_type == hinge) & (model.jnt_limited == 0)
+        return "qpos", int(model.nq), model.jnt_qposadr[free].tolist()
 
     def attach(self) -> None:
         """Let what is saved be that of `inner`."""

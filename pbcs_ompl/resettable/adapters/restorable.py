@@ -3,6 +3,7 @@
 import math
 import warnings
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from copy import copy
 from typing import Any, Self
 
@@ -23,6 +24,7 @@ from pbcs_ompl.resettable.rules import (
     goal_rule,
     reported_success,
     rule_text,
+    selected_dims,
 )
 from pbcs_ompl.resettable.task_env import TaskEnv
 
@@ -72,6 +74,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.goal_threshold = self.goal_radius if self._has_goal_distance else 0.5
         saved = len(self.save())
         self.feature_dims = tuple(range(len(self._head)))
+        self.feature_periods = self._periods()
         self.exploring = True
         self.bounds = feature_bounds(self)
         self.exploring = False
@@ -120,6 +123,23 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
     def reported_goal_distance(self, observation: Any) -> float | None:
         """Return the distance to the goal that an observation of `inner` shows; None where it shows none."""
         return None
+
+    def angles(self) -> tuple[str, int, Sequence[int]]:
+        """Return a source of numbers (see `rule_language`), how many it has, and which are angles that turn freely."""
+        return "state", 0, ()
+
+    def usual_rule(self) -> str | None:
+        """Return what planners explore unless the user says otherwise, as a rule, where it is one."""
+        return None
+
+    def _periods(self) -> Array:
+        """Return the period of each feature [F]: 2 pi for an angle that turns freely, else 0."""
+        source, size, angles = self.angles()
+        rule = self.usual_rule() if self.feature_rule is None else self.feature_rule
+        dims = None if rule is None else selected_dims(rule, source, size)
+        if dims is None:
+            return np.zeros(len(self._head))
+        return np.array([2.0 * np.pi if dim in angles else 0.0 for dim in dims])
 
     def feature_box(self) -> tuple[Array, Array] | None:
         """Return the bounds [F] of the feature; None where they have to be explored."""

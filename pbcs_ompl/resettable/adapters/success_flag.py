@@ -51,6 +51,7 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
         self.feature_dims = tuple(range(len(state))) if offers.feature_dims is None else offers.feature_dims
         # What the environment offers itself; `EnvAttributes` takes None for what is not offered.
         self.bin_size, self.max_episode_steps = offers.bin_size, offers.max_episode_steps
+        self.feature_periods = offers.feature_periods
         self.parallel_batch, self.perturb_by_rollouts = offers.parallel_batch, offers.perturb_by_rollouts
         self.walls, self.goal_circle = offers.walls, offers.goal_circle
         self.advance_towards = None if offers.advance_towards is None else self._advance_towards

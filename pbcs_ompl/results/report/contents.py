@@ -79,7 +79,7 @@ def read_content(folder: Folder) -> Content:
     """
     readers: dict[str, Callable[[Folder], Content]] = {
         "plan": _plan, "train": _training, "eval": _evaluation, "compare": _comparison, "study": _study,
-        "follower": _follower}
+        "follower": _follower, "distill": _distillation}
     return readers[folder.kind](folder)
 
 
@@ -122,6 +122,19 @@ def _follower(folder: Folder) -> Content:
     return Content(title, f"{result['test_rate']:.0%} of the test lines", None,
                    [("test lines without noise", f"{result['test_rate']:.0%}"),
                     ("transitions", format_number(result["transitions"])),
+                    ("updates", format_number(result["updates"])), ("time", format_duration(result["seconds"]))],
+                   str(config["seed"]))
+
+
+def _distillation(folder: Folder) -> Content:
+    config, result = folder.config, folder.result
+    title = f"One network in place of {config['chain'] or 'a chain'} in {_environment(config)}"
+    if result is None:
+        return Content(title, UNFINISHED, None, [], str(config["seed"]))
+    return Content(title, "solved" if result["solved"] else "not solved", result["solved"],
+                   [("student, with 10 % random actions", format_rate(result["success_rate"], result["wilson"])),
+                    ("teacher", format_rate(result["teacher_success_rate"], result["teacher_wilson"])),
+                    ("rounds", format_number(result["rounds"])), ("transitions", format_number(result["transitions"])),
                     ("updates", format_number(result["updates"])), ("time", format_duration(result["seconds"]))],
                    str(config["seed"]))
 

@@ -14,6 +14,7 @@ from pbcs_ompl.results.command_line import (
     Words,
     command,
     compare_words,
+    distill_words,
     eval_words,
     follower_words,
     plan_words,
@@ -92,7 +93,7 @@ def _words(folder: Folder) -> Words:
                                    trust=bool(EnvSpec.from_dict(config["environment"]).modules)),
         "compare": lambda: compare_words(config),
         "study": lambda: _study_words(config),
-        "follower": lambda: follower_words(config)}
+        "follower": lambda: follower_words(config), "distill": lambda: distill_words(config)}
     return words[folder.kind]()
 
 

@@ -97,6 +97,19 @@ def planned_line(follower: RobotFollower, model: ResettableModel, states: Array)
     return follower.line_of(np.concatenate([places, *centre]))
 
 
+def smoothed_line(follower: RobotFollower, model: ResettableModel, states: Array) -> Line:
+    """Return a line near the states of a plan [T+1, D] that keeps clear of walls, to the centre of the goal.
+
+    Where the environment does not say where its goal is, it ends where the plan does.
+
+    Raises:
+        InvalidState: no way leads there.
+    """
+    places = follower.view.places(model.observe(states))
+    goal = places[-1] if model.goal_circle is None else np.array(model.goal_circle[:2])
+    return free_space(model, follower.clearance).smoothed(places, goal, follower.spacing)
+
+
 def shortest_line(follower: RobotFollower, model: ResettableModel) -> Line:
     """Return the line of the shortest way from a start to the goal that keeps clear of walls.
 

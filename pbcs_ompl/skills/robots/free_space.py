@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import KDTree
 
 from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
@@ -19,6 +20,8 @@ WIDE = 1.8
 """Clearances from the walls at which a body has the space to begin (ours)."""
 SHARPEST = 2.1
 """Largest turn between two legs of a random line, in radians (ours): a line does not lead back where it came from."""
+TUBE = 1.5
+"""Clearances from a plan within which its smoothed line stays, where one exists there (ours)."""
 NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
@@ -84,9 +87,22 @@ class FreeSpace:
         squares = np.where(free, ((self.centres - place) ** 2).sum(axis=1), np.inf)
         return int(squares.argmin())
 
-    def ways(self, first: int, targets: IndexArray) -> list[Array | None]:
-        """Return the cheapest ways from a cell to others, corners [N, 2] each; None where there is none."""
-        _, before = dijkstra(self._graph, directed=False, indices=first, return_predecessors=True)
+    def ways(self, first: int, targets: IndexArray, within: BoolArray | None = None) -> list[Array | None]:
+        """Return the cheapest ways from a cell to others, corners [N, 2] each; None where there is none.
+
+        Args:
+            first: The cell where they begin.
+            targets: Those where they end.
+            within: Which cells they may use, beside those two [N]; None for all that are free.
+        """
+        graph = self._graph
+        if within is not None:
+            within = within.copy()
+            within[[first, *targets]] = True
+            kept = csr_matrix((within.astype(float), (np.arange(len(within)),) * 2), shape=graph.shape)
+            graph = (kept @ graph @ kept).tocsr()
+            graph.eliminate_zeros()
+        _, before = dijkstra(graph, directed=False, indices=first, return_predecessors=True)
         found: list[Array | None] = []
         for target in targets.tolist():
             way = [target]
@@ -114,6 +130,29 @@ class FreeSpace:
             raise InvalidState(f"no way from {start.tolist()} to {goal.tolist()} with {self.clearance:g} to the walls; "
                                "choose a smaller clearance")
         return Line.through(np.concatenate([start[None], way[1:-1], goal[None]]), spacing)
+
+    def smoothed(self, places: Array, goal: Array, spacing: float) -> Line:
+        """Return the line of the cheapest way from the first of some places to a goal that stays near all of them.
+
+        It keeps clear of walls and leaves out what exploration did in between. Near is within `TUBE` clearances; where
+        no way is that near, because the places are too close to walls, twice as far, and so on.
+
+        Args:
+            places: Those of a plan [T+1, 2].
+            goal: Where the line ends [2].
+            spacing: Of the points of the line.
+
+        Raises:
+            InvalidState: no way leads there at all.
+        """
+        away, _ = KDTree(np.concatenate([places, goal[None]])).query(self.centres)
+        first, last, width = self.cell(places[0]), self.cell(goal), TUBE * self.clearance
+        while width < away.max():
+            (way,) = self.ways(first, np.array([last]), away <= width)
+            if way is not None:
+                return Line.through(np.concatenate([places[:1], way[1:-1], goal[None]]), spacing)
+            width *= 2.0
+        return self.line_between(places[0], goal, spacing)
 
     def random_lines(self, count: int, rng: np.random.Generator, *, longest: float, spacing: float) -> list[Line]:
         """Return lines through random places: cheapest ways from one to the next, of one to three legs each.

@@ -69,6 +69,22 @@ def test_ways_keep_clear_of_walls_and_are_hardly_longer_than_they_must_be() -> N
             np.array([0.5, 0.5]), np.array([3.5, 0.5]), 0.05)
 
 
+def test_a_smoothed_plan_is_shorter_clear_of_walls_and_on_the_same_side_of_them() -> None:
+    """The plan goes round a block by the longer way, with detours; so does its line."""
+    space = FreeSpace(np.array([[1.5, 1.0, 2.5, 3.6]]), np.zeros(2), np.full(2, 4.0), 0.2)
+    corners = np.array([[0.5, 1.5], [0.6, 2.4], [0.3, 2.0], [0.9, 3.79], [2.0, 3.79], [3.6, 3.7], [3.0, 3.0],
+                        [3.5, 2.0]])
+    places = Line.through(corners, 0.02).points
+    line = space.smoothed(places, np.array([3.4, 1.5]), 0.05)
+    np.testing.assert_allclose(line.points[[0, -1]], [[0.5, 1.5], [3.4, 1.5]])
+    assert line.points[:, 1].max() > 3.6  # above the block, where the plan was; below would be shorter
+    assert space.distance(line.points).min() > 0.15
+    assert line.length < 0.85 * Line.through(corners, 0.02).length
+    away = np.linalg.norm(line.points[:, None] - np.concatenate([places, line.points[-1:]]), axis=2).min(axis=1)
+    assert away.max() < 2 * 1.5 * 0.2
+    assert space.line_between(corners[0], np.array([3.4, 1.5]), 0.05).points[:, 1].min() < 1.0
+
+
 def test_random_lines_are_free_long_and_differ() -> None:
     model = pbcs_ompl.make("pbcs/Maze-v0", {"size": 4, "maze_seed": 1})
     space = free_space(model, 0.1)
@@ -248,3 +264,30 @@ def test_the_budget_binds(budget: int) -> None:
     with pytest.raises(InvalidOption, match="expected at least"):
         train_follower("pbcs/Maze-v0", **arguments, max_transitions=100)
     assert budget - 5_000 < train_follower("pbcs/Maze-v0", **arguments, max_transitions=budget).transitions <= budget
+
+
+def test_plan_lets_a_follower_drive_along_the_smoothed_plan(trained: FollowerResult, tmp_path: Path,
+                                                            capsys: pytest.CaptureFixture[str]) -> None:
+    out, env = str(tmp_path / "plan"), ["--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 3}', "--no-pictures"]
+    follow = ["--follow", str(trained.out), "--episodes", "7", "--epsilon", "0.1", "--json"]
+    assert main(["plan", *env, "--planner", "Rides", "--out", out, *follow]) == 0
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)["followed"]
+    assert (found["episodes"], found["epsilon"]) == (7, 0.1)
+    assert found["success_rate"] > 0.5
+    assert "followed" in printed.err
+
+
+@pytest.mark.parametrize(("words", "complaint"), [
+    (["--episodes", "3"], "add --follow"),
+    (["--follow", "nowhere"], "nowhere"),
+    (["--follow", "ant"], "not for that of"),
+])
+def test_a_follower_that_does_not_fit_is_refused_before_planning(words: list[str], complaint: str, tmp_path: Path,
+                                                                 capsys: pytest.CaptureFixture[str]) -> None:
+    if "ant" in words:
+        pytest.importorskip("mujoco")
+    out = tmp_path / "plan"
+    assert main(["plan", "--env", "pbcs/Maze-v0", "--out", str(out), *words]) == 2
+    assert complaint in capsys.readouterr().err
+    assert not out.exists()

@@ -1,0 +1,126 @@
+"""Success under random actions, task by task, and what it cost."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pbcs_ompl.core.statistics import wilson
+from pbcs_ompl.experiments.claims import FEWEST_PAIRS, Claim, rate
+from pbcs_ompl.figures.canvas import colour, new_panels, publish
+
+Records = list[dict[str, Any]]
+COLUMNS = 3
+ENOUGH = 0.9
+"""A method suffices for a task where at least this fraction of the executions with 10 % random actions succeeds."""
+NOISE = "0.1"
+SOURCE = "ours"
+
+
+def analyse(records: Records, figures: Path) -> list[Claim]:
+    """Draw a panel for each task and write the table; say where a regulator or predictive control suffices."""
+    executed = [record for record in records if record.get("evaluations")]
+    tasks = _distinct(executed, "task")
+    if tasks:
+        _draw(executed, tasks, figures)
+        (figures / "table.md").write_text(_table(executed, tasks))
+    return [_planned(records), _open_loop(executed, tasks), *(_suffices(method, executed, tasks) for method in (
+        "lqr", "mppi", "follow", "pbcs", "reverse-curriculum"))]
+
+
+def successes(records: Records, noise: str) -> tuple[int, int]:
+    """Return the successful executions and all; a training without a policy has failed in all of them."""
+    reached, total = 0, 0
+    for record in records:
+        found = record["evaluations"][noise]
+        total += record["episodes"]
+        reached += 0 if found is None else round(found["success_rate"] * found["episodes"])
+    return reached, total
+
+
+def _distinct(records: Records, key: str) -> list[str]:
+    return list(dict.fromkeys(record[key] for record in records))
+
+
+def _of(records: Records, task: str, method: str) -> Records:
+    return [record for record in records if record["task"] == task and record["method"] == method]
+
+
+def _label(method: str, records: Records) -> str:
+    privileged = any(record["privileged"] for record in records if record["method"] == method)
+    return f"{method} (privileged)" if privileged else method
+
+
+def _draw(records: Records, tasks: list[str], figures: Path) -> None:
+    figure, panels = new_panels(-(-len(tasks) // COLUMNS), COLUMNS)
+    methods = _distinct(records, "method")
+    for axes, task in zip(panels, tasks, strict=False):
+        for index, method in enumerate(methods):
+            chosen = _of(records, task, method)
+            if not chosen:
+                continue
+            levels = list(chosen[0]["evaluations"])
+            counts = [successes(chosen, level) for level in levels]
+            rates = np.array([reached / total for reached, total in counts])
+            bounds = np.array([wilson(*count) for count in counts]).T
+            axes.errorbar([100 * float(level) + 0.25 * (index - 2.5) for level in levels], rates,
+                          np.abs(bounds - rates), fmt="o-", capsize=2, linewidth=1.2, markersize=4, color=colour(index),
+                          label=f"{_label(method, records)}, {len(chosen)} seeds, N = {counts[0][1]}")
+        axes.set_title(task, fontsize=10)
+        axes.set_ylim(-0.04, 1.04)
+        axes.set_xlabel("% random actions")
+        axes.set_ylabel("successful executions")
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=6)
+    for axes in panels[len(tasks):]:
+        axes.remove()
+    figure.suptitle("Executions of a plan by the judge (95 % Wilson; executions of one seed share a plan)", fontsize=11)
+    publish(figure, figures / "closed-loop.png")
+
+
+def _table(records: Records, tasks: list[str]) -> str:
+    levels = list(records[0]["evaluations"])
+    lines = ["| task | method | seeds | " + " | ".join(f"{100 * float(level):g} %" for level in levels)
+             + " | transitions | CPU s | ms an action |",
+             "|---|---|---|" + "---|" * len(levels) + "---|---|---|"]
+    for task in tasks:
+        for method in _distinct(records, "method"):
+            chosen = _of(records, task, method)
+            if chosen:
+                rates = " | ".join("{} of {}".format(*successes(chosen, level)) for level in levels)
+                lines.append(f"| {task} | {_label(method, records)} | {len(chosen)} | {rates} | "
+                             f"{_median(chosen, 'train_transitions'):,.0f} | {_median(chosen, 'cpu_seconds'):.1f} | "
+                             f"{_median(chosen, 'ms_per_action'):.2f} |")
+    return "\n".join(lines) + "\n"
+
+
+def _median(records: Records, key: str) -> float:
+    values = [record[key] for record in records if record[key] is not None]
+    return float(np.median(values)) if values else float("nan")
+
+
+def _planned(records: Records) -> Claim:
+    solved = {task: rate(sum(record["planned"] for record in mine), len(mine)) for task in _distinct(records, "task")
+              for mine in [[record for record in records if record["task"] == task]]}
+    return Claim("a plan is found for every seed of every task",
+                 all(one["rate"] == 1.0 for one in solved.values()) if solved else None, solved, SOURCE)
+
+
+def _rates(method: str, records: Records, tasks: list[str]) -> dict[str, dict[str, Any]]:
+    found = {task: successes(_of(records, task, method), NOISE) for task in tasks}
+    return {task: rate(*counts) for task, counts in found.items() if counts[1]}
+
+
+def _open_loop(records: Records, tasks: list[str]) -> Claim:
+    found = _rates("open-loop", records, tasks)
+    fails = [task for task, one in found.items() if one["rate"] < ENOUGH]
+    return Claim("with 10 % random actions a plan without feedback fails in most of the tasks (less than 90 %)",
+                 len(fails) > len(found) / 2 if len(found) >= FEWEST_PAIRS else None, found or rate(0, 0), SOURCE)
+
+
+def _suffices(method: str, records: Records, tasks: list[str]) -> Claim:
+    found = _rates(method, records, tasks)
+    enough = [task for task, one in found.items() if one["rate"] >= ENOUGH]
+    return Claim(f"{_label(method, records)} suffices with 10 % random actions (at least 90 %) wherever it was run",
+                 len(enough) == len(found) if found else None, found or rate(0, 0), SOURCE,
+                 f"it suffices in {', '.join(enough)}" if enough else "")
