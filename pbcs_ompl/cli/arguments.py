@@ -205,6 +205,7 @@ def _compare(verb: Parser) -> None:
     verb.add_argument("--max-seconds", type=seconds, metavar="S", help="stop a run after this much wall time")
     verb.add_argument("--max-memory", type=integer(1), metavar="MB",
                       help="kill a run whose process holds more; Python and the libraries take about 250")
+    _add_improve(verb)
     _add_execution(verb)
     _add_out(verb)
 

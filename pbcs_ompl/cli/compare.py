@@ -29,7 +29,8 @@ def run(arguments: Namespace) -> int:
                                  feature=arguments.feature, start_seed=arguments.start_seed,
                                  reset_options=arguments.reset_options, seeds=arguments.seeds,
                                  max_transitions=arguments.max_transitions, max_seconds=arguments.max_seconds,
-                                 max_memory=arguments.max_memory, jobs=jobs, out=out, on_progress=display)
+                                 max_memory=arguments.max_memory, improve=arguments.improve, jobs=jobs, out=out,
+                                 on_progress=display)
     except KeyboardInterrupt as error:
         raise with_remedy(error, f"continue with the same command and --out {shell(str(out))}") from None
     draw_comparison(comparison, f"{arguments.seeds} seeds", out)

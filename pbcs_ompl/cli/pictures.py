@@ -57,7 +57,10 @@ def draw_chain(model: ResettableModel, chain: "TrainedController", trajectory: A
 
 
 def draw_comparison(comparison: "Comparison", title: str, out: Path) -> None:
-    """Draw compare.png, the distribution of the transitions to the goal, and coverage.png, how it grew."""
+    """Draw compare.png, the distribution of the transitions to the goal, and coverage.png, how it grew.
+
+    Where plans were made shorter, also length.png.
+    """
     def picture(name: str) -> Any:
         from pbcs_ompl.figures import compare
 
@@ -65,3 +68,5 @@ def draw_comparison(comparison: "Comparison", title: str, out: Path) -> None:
 
     draw("compare.png", lambda: picture("distribution_figure"), out)
     draw("coverage.png", lambda: picture("coverage_figure"), out)
+    if any(record.get("improvement") for record in comparison.runs):
+        draw("length.png", lambda: picture("length_figure"), out)

@@ -66,7 +66,7 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
             feature: str | None = None, start_seed: int | None = None,
             reset_options: Options | None = None, seeds: int | Sequence[int] = 10,
             max_transitions: int = 1_000_000, max_seconds: float | None = None, max_memory: float | None = None,
-            jobs: int | Executor = 1, out: str | Path | None = None,
+            improve: int | str | None = None, jobs: int | Executor = 1, out: str | Path | None = None,
             on_progress: ProgressCallback | None = None) -> Comparison:
     """Run every planner in every environment with every seed, in spawned processes.
 
@@ -85,6 +85,7 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
             later is killed.
         max_memory: MB that the process of one run may hold before it is killed; Python and the libraries take about
             250. None for any.
+        improve: What making each plan shorter may use after its search, as in `plan`; None for nothing.
         jobs: How many processes work at a time (with more than there are cores the seconds mean nothing), or what
             executes the runs elsewhere: see `experiments.workers.ray.ray_cluster`.
         out: The folder for all results (see docs/compare.md); None for none.
@@ -99,7 +100,8 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
     executor = make_executor(jobs)
     environments = environment_specs(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed,
                                      reset_options=reset_options)
-    sweep = make_sweep(planners, environments, seeds, max_transitions, max_seconds, max_memory)
+    sweep = make_sweep(planners, environments, seeds, max_transitions, max_seconds, max_memory,
+                       improve)
     folder = None if out is None else Path(out)
     with nullcontext() if folder is None else open_run(folder, sweep.config(), may_change=("seeds",)):
         known = {} if folder is None else _read_records(folder, sweep)

@@ -11,7 +11,7 @@ from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.experiments.run import Failure, Record, Run
 
 MEASURED = ("transitions", "collision_checks", "seconds", "nodes", "path_length", "replay_ok", "memory", "coverage",
-            "progress", "planner_settings")
+            "progress", "planner_settings", "improvement")
 """What the record of a run has beside what identifies it (see docs/compare.md); None in a run that failed."""
 IDENTITY = ("planner", "seed", "environment")
 
@@ -27,7 +27,7 @@ def run_planner(run: Run) -> Record:
     _reset_peak_of_memory()
     result = _plan(run.settings)
     measured = {name: value for name, value in result.summary().items() if name in MEASURED}
-    return {**_identity(run), "solved": result.solved, **measured, "memory": _peak_megabytes(),
+    return {**_identity(run), "solved": result.solved, "improvement": None, **measured, "memory": _peak_megabytes(),
             **_coverage(result.coverage), "planner_settings": result.planner_settings, "reason": result.reason}
 
 
@@ -59,7 +59,8 @@ def _identity(run: Run) -> Record:
 
 
 def _plan(settings: dict[str, Any], **limits: Any) -> PlanResult:
-    chosen = {name: settings[name] for name in ("planner_kwargs", "seed", "max_transitions", "max_seconds")} | limits
+    names = ("planner_kwargs", "seed", "max_transitions", "max_seconds", "improve")
+    chosen = {name: settings[name] for name in names} | limits
     return plan(EnvSpec.from_dict(settings["environment"], trusted=True), settings["planner"], coverage=True, **chosen)
 
 

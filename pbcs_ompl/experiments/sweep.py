@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from pbcs_ompl.bridge.improve import Allowance
 from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.bridge.termination import checked_limits
@@ -36,6 +37,7 @@ class Sweep:
         environments: Each with a label of its own.
         seeds: The seeds.
         max_transitions, max_seconds, max_memory: The budget of one run; None for any.
+        improve: What making each plan shorter may use (see `plan`); None for nothing.
         versions: The packages that the runs depend on.
     """
 
@@ -45,6 +47,7 @@ class Sweep:
     max_transitions: int
     max_seconds: float | None
     max_memory: float | None
+    improve: int | str | None
     versions: dict[str, str]
 
     def runs(self) -> Iterator[Run]:
@@ -55,7 +58,7 @@ class Sweep:
                     name = f"{self.folder(number)}/{planner.replace(':', '.')}-{seed}"
                     yield Run(name, {"planner": planner, "planner_kwargs": options, "seed": seed,
                                      "environment": environment.to_dict(), "max_transitions": self.max_transitions,
-                                     "max_seconds": self.max_seconds})
+                                     "max_seconds": self.max_seconds, "improve": self.improve})
 
     def folder(self, number: int) -> str:
         """Return the name of the folder of the runs in the environment of this number; they are counted from 1."""
@@ -66,7 +69,8 @@ class Sweep:
         return {"kind": "compare", "planners": list(self.planners),
                 "environments": [environment.to_dict() for environment in self.environments],
                 "seeds": self.seeds, "max_transitions": self.max_transitions, "max_seconds": self.max_seconds,
-                "max_memory": self.max_memory, "planner_kwargs": self.planners, "versions": self.versions}
+                "max_memory": self.max_memory, "improve": self.improve, "planner_kwargs": self.planners,
+                "versions": self.versions}
 
     @classmethod
     def from_config(cls, config: dict[str, Any]) -> "Sweep":
@@ -74,12 +78,12 @@ class Sweep:
         environments = [EnvSpec.from_dict(place) for place in config["environments"]]
         planners = {name: config["planner_kwargs"].get(name, {}) for name in config["planners"]}
         return cls(planners, environments, config["seeds"], config["max_transitions"], config.get("max_seconds"),
-                   config.get("max_memory"), config["versions"])
+                   config.get("max_memory"), config.get("improve"), config["versions"])
 
 
 def make_sweep(planners: Sequence[str] | Mapping[str, Options], environments: Sequence[EnvSpec],
                seeds: int | Sequence[int], max_transitions: int, max_seconds: float | None,
-               max_memory: float | None) -> Sweep:
+               max_memory: float | None, improve: int | str | None = None) -> Sweep:
     """Return the sweep of a comparison. The arguments are those of `compare`; see there.
 
     Args:
@@ -87,6 +91,7 @@ def make_sweep(planners: Sequence[str] | Mapping[str, Options], environments: Se
         environments: The environments.
         seeds: How many seeds (0, 1, ...), or the seeds.
         max_transitions, max_seconds, max_memory: The budget of one run.
+        improve: What making each plan shorter may use.
 
     Raises:
         InvalidOption: something is missing, there twice, or out of its range; a planner refuses an option.
@@ -100,9 +105,12 @@ def make_sweep(planners: Sequence[str] | Mapping[str, Options], environments: Se
     _check_unique("environments", [environment.label for environment in environments])
     _check_unique("seeds", chosen)
     limits = checked_limits(max_transitions, max_seconds)
+    if improve is not None:
+        Allowance.of(improve)
     models = [make(environment) for environment in environments]
     resolved = {name: _resolved(name, given, models[0]) for name, given in options.items()}
-    return Sweep(resolved, list(environments), chosen, *limits, max_memory, planning_versions())
+    return Sweep(resolved, list(environments), chosen, *limits, max_memory, improve,
+                 planning_versions())
 
 
 def environment_specs(env: Environment | Sequence[Environment], env_kwargs: Options | Sequence[Options] | None = None,

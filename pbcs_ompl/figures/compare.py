@@ -34,6 +34,15 @@ def coverage_figure(environments: Mapping[str, Runs], *, title: str = "") -> Fig
     return _panels(environments, _draw_coverage, "transitions", "share of the cells reached", title)
 
 
+def length_figure(environments: Mapping[str, Runs], *, title: str = "") -> Figure:
+    """Draw how long plans are after a number of transitions, those of the search included: median and quartiles.
+
+    As OMPL's benchmarks show the cost of the best solution over time. One panel for each environment. A run without a
+    plan yet is infinitely long, so a curve begins where half of the runs have one; it ends with the longest run.
+    """
+    return _panels(environments, _draw_lengths, "transitions", "steps of the plan", title)
+
+
 def _panels(environments: Mapping[str, Runs], draw: Callable[[Axes, Runs], None], x: str, y: str, title: str) -> Figure:
     columns = min(MOST_COLUMNS, max(1, len(environments)))
     rows = max(1, ceil(len(environments) / columns))
@@ -75,6 +84,34 @@ def _draw_coverage(axes: Axes, runs: Runs) -> None:
         axes.plot(points, middle, color=f"C{number}", linewidth=2, label=f"{name} ({len(curves)} runs)")
         axes.fill_between(points, low, high, color=f"C{number}", alpha=0.2, linewidth=0)
     axes.set_ylim(bottom=0)
+
+
+def _draw_lengths(axes: Axes, runs: Runs) -> None:
+    for number, (name, some) in enumerate(runs.items()):
+        curves = [_lengths(run) for run in some]
+        points = np.unique(np.concatenate([reached for reached, _ in curves]))
+        if not len(points):
+            continue
+        steps = np.array([np.append(np.inf, length)[np.searchsorted(reached, points, side="right")]
+                          for reached, length in curves])
+        low, middle, high = np.quantile(steps, [0.25, 0.5, 0.75], axis=0, method="nearest")
+        known = np.isfinite(middle)
+        axes.step(points[known], middle[known], where="post", color=f"C{number}", linewidth=2,
+                  label=f"{name} ({len(curves)} runs)")
+        axes.fill_between(points[known], low[known], np.where(np.isfinite(high), high, middle)[known], step="post",
+                          color=f"C{number}", alpha=0.2, linewidth=0)
+    axes.set_ylim(bottom=0)
+
+
+def _lengths(run: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Return the transitions [K] at which a run had a shorter plan, and its steps [K]; the last where it ended."""
+    if not run["solved"]:
+        return np.empty(0), np.empty(0)
+    note = run.get("improvement")
+    if note is None:
+        return np.array([float(run["transitions"])]), np.array([float(run["path_length"])])
+    transitions = run["transitions"] + np.array([*note["progress"]["transitions"], note["transitions"]], np.float64)
+    return transitions, np.array([*note["progress"]["length"], note["after"]], np.float64)
 
 
 def _held(curve: Mapping[str, Sequence[float]], points: Array) -> Array:

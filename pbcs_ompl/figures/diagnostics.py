@@ -36,7 +36,7 @@ def success_figure(curves: Mapping[str, tuple[IndexArray, BoolArray]], *, title:
 
 def curves_figure(steps: Array, panels: Mapping[str, Array], *, title: str = "", xlabel: str = "updates") -> Figure:
     """Draw one panel for each quantity [E, S], one line for each seed ([Matheron2020] Fig. 6.4)."""
-    figure, grid = new_panels(1, len(panels), 4.2 * len(panels), 3.8)
+    figure, grid = new_panels(1, len(panels), max(6.4, 4.2 * len(panels)), 3.8)
     for axes, (name, values) in zip(grid, panels.items(), strict=True):
         axes.plot(steps, values, linewidth=1)
         axes.set_xlabel(xlabel)

@@ -15,7 +15,7 @@ from pbcs_ompl.core.formatting import is_printable
 from pbcs_ompl.core.plain import plain
 
 Words = list[str]
-BUDGETS = ("max_transitions", "max_seconds", "max_memory")
+BUDGETS = ("max_transitions", "max_seconds", "max_memory", "improve")
 
 
 def command(words: Sequence[str]) -> str:

@@ -105,6 +105,7 @@ class CompareConfig(Budgets):
     environments: list[EnvValues]
     seeds: list[Count]
     versions: Versions
+    improve: NotRequired[Positive | str]
 
 
 class StudyConfig(TypedDict):
@@ -240,6 +241,7 @@ class RunOfComparison(TypedDict):
     coverage: Share | None
     progress: Progress | None
     planner_settings: Table | None
+    improvement: NotRequired[Improvement | None]
 
 
 class RunOfStudy(TypedDict):

@@ -102,20 +102,47 @@ class ClassifierSettings(Settings):
 
 
 @dataclass(frozen=True, eq=False)
-class ClassifierSet:
-    """States s with d(s, center) <= reach radius and p(s) >= confidence, for the probability of success
+class SuccessNetwork:
+    """A small network that says from which observations a skill reaches its target:
 
-        p(s) = sigmoid(w_2 tanh(w_1 (o(s) - origin) / scale + b_1) + b_2)
+        p(o) = sigmoid(w_2 tanh(w_1 (o - origin) / scale + b_1) + b_2).
 
-    of a small network. Unlike a ball it depends on all that the policy observes, such as speeds, which the distance
-    between the states of a simulator leaves out.
+    Attributes:
+        confidence: Probability from which an observation is accepted.
+        origin, scale: Mean and deviation of the observations it was learnt from [O].
+        weights_1, bias_1, weights_2, bias_2: The network, [O, H], [H], [H, 1], [1].
+    """
+
+    confidence: float
+    origin: Array
+    scale: Array
+    weights_1: Array
+    bias_1: Array
+    weights_2: Array
+    bias_2: Array
+
+    def probability(self, observations: Array) -> Array:
+        """Return how likely the skill is to reach its target [B] from where it observes `observations` [B, O]."""
+        hidden = np.tanh((observations - self.origin) / self.scale @ self.weights_1 + self.bias_1)
+        return 1.0 / (1.0 + np.exp(-(hidden @ self.weights_2 + self.bias_2)[:, 0]))
+
+    def accepts(self, observations: Array) -> BoolArray:
+        """Return at which observations [B, O] the probability is high enough [B]."""
+        accepted: BoolArray = self.probability(observations) >= self.confidence
+        return accepted
+
+
+@dataclass(frozen=True, eq=False)
+class ClassifierSet(SuccessNetwork):
+    """States s with d(s, center) <= reach radius whose observations a network accepts.
+
+    Unlike a ball it depends on all that the policy observes, such as speeds, which the distance between the states of a
+    simulator leaves out.
 
     Attributes:
         center: The state in the middle [D]; distances are measured from there.
         radius: That of the ball in whose place it is.
-        reach, confidence: See `ClassifierSettings`.
-        origin, scale: Mean and deviation of the observations it was learnt from [O].
-        weights_1, bias_1, weights_2, bias_2: The network, [O, H], [H], [H, 1], [1].
+        reach: See `ClassifierSettings`.
 
     Source: [Matheron2020] 7.2.4 and the limitations of its conclusion. Differs: samples are drawn forwards from states
     around the centre, which needs no simulator that runs backwards, and the classifier learns from their outcomes.
@@ -124,13 +151,6 @@ class ClassifierSet:
     center: Array
     radius: float
     reach: float
-    confidence: float
-    origin: Array
-    scale: Array
-    weights_1: Array
-    bias_1: Array
-    weights_2: Array
-    bias_2: Array
 
     def distance(self, model: ResettableModel, states: Array) -> Array:
         """Return the distances [B] from states [B, D] to the centre."""
@@ -140,26 +160,8 @@ class ClassifierSet:
         """Return which of the states [B, D] lie in the set."""
         inside = self.distance(model, states) <= self.reach * self.radius
         if inside.any():  # observing a simulator's states is slow
-            inside[inside] = self.probability(model.observe(states[inside])) >= self.confidence
+            inside[inside] = self.accepts(model.observe(states[inside]))
         return inside
-
-    def probability(self, observations: Array) -> Array:
-        """Return how likely the skill is to reach its target [B] from where it observes `observations` [B, O]."""
-        return probability(observations, self.origin, self.scale, self.weights_1, self.bias_1, self.weights_2,
-                           self.bias_2)
-
-
-def probability(observations: Array, origin: Array, scale: Array, weights_1: Array, bias_1: Array, weights_2: Array,
-                bias_2: Array) -> Array:
-    """Return the output [B] of the network of a `ClassifierSet`.
-
-    Args:
-        observations: [B, O].
-        origin, scale: Mean and deviation of the observations it was learnt from [O].
-        weights_1, bias_1, weights_2, bias_2: The network, [O, H], [H], [H, 1], [1].
-    """
-    hidden = np.tanh((observations - origin) / scale @ weights_1 + bias_1)
-    return 1.0 / (1.0 + np.exp(-(hidden @ weights_2 + bias_2)[:, 0]))
 
 
 def learn_set(observations: Array, reached: BoolArray, ball: Ball, settings: ClassifierSettings,
@@ -189,8 +191,10 @@ def learn_set(observations: Array, reached: BoolArray, ball: Ball, settings: Cla
         optimizer.zero_grad()
         torch.autograd.backward(loss)
         optimizer.step()
-    return ClassifierSet(ball.center, ball.radius, settings.reach, settings.confidence, origin, scale,
-                         *(values.detach().numpy() for values in parameters))
+    learnt = [np.asarray(values.detach().numpy(), dtype=np.float64) for values in parameters]
+    network = dict(zip(("weights_1", "bias_1", "weights_2", "bias_2"), learnt, strict=True))
+    return ClassifierSet(confidence=settings.confidence, origin=origin, scale=scale, center=ball.center,
+                         radius=ball.radius, reach=settings.reach, **network)
 
 
 def _initial(size: int, hidden: int, seed: int) -> list[Tensor]:

@@ -14,7 +14,7 @@ from scipy.optimize import nnls
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.skills.activation_sets import ClassifierSet, probability
+from pbcs_ompl.skills.activation_sets import ClassifierSet, SuccessNetwork
 
 TOLERANCE = 0.02
 """Largest error of an observed distance, as a fraction of the radius."""
@@ -63,22 +63,8 @@ class _Balls:
 
 
 @dataclass(frozen=True, eq=False)
-class ObservedClassifier:
-    """The observations that a network thinks to be in the set; see `activation_sets.ClassifierSet`.
-
-    Attributes:
-        confidence: Probability from which an observation belongs to the set.
-        origin, scale: Mean and deviation of the observations it was learnt from [O].
-        weights_1, bias_1, weights_2, bias_2: The network, [O, H], [H], [H, 1], [1].
-    """
-
-    confidence: float
-    origin: Array
-    scale: Array
-    weights_1: Array
-    bias_1: Array
-    weights_2: Array
-    bias_2: Array
+class ObservedClassifier(SuccessNetwork):
+    """The observations that a network accepts."""
 
     @classmethod
     def of(cls, learnt: ClassifierSet) -> "ObservedClassifier":
@@ -87,10 +73,7 @@ class ObservedClassifier:
 
     def contains(self, observations: Array) -> BoolArray:
         """Return which of the observations [B, O] lie in the set [B]."""
-        chances = probability(observations, self.origin, self.scale, self.weights_1, self.bias_1, self.weights_2,
-                              self.bias_2)
-        inside: BoolArray = chances >= self.confidence
-        return inside
+        return self.accepts(observations)
 
 
 @dataclass(frozen=True, eq=False)

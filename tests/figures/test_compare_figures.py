@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.figures.canvas import save
-from pbcs_ompl.figures.compare import coverage_figure, distribution_figure
+from pbcs_ompl.figures.compare import coverage_figure, distribution_figure, length_figure
 
 
 def run(transitions, solved=True, coverage=(0.1, 0.5)):
     progress = {"transitions": [1, transitions], "coverage": list(coverage)}
-    return {"solved": solved, "transitions": transitions, "progress": progress}
+    return {"solved": solved, "transitions": transitions, "path_length": 7, "improvement": None, "progress": progress}
 
 
 BROKEN = {"solved": False, "transitions": None, "progress": None}
@@ -35,7 +35,28 @@ def test_coverage_is_the_median_run_and_ended_runs_keep_theirs():
     assert (np.diff(curve.get_ydata()) >= 0).all()
 
 
-@pytest.mark.parametrize("draw", [distribution_figure, coverage_figure])
+def improved(transitions, lengths, solved=True):
+    """Return a run whose plan has the given lengths after 0, 10, 20, ... more transitions than its search."""
+    progress = {"transitions": [10 * number for number in range(len(lengths))], "length": list(lengths)}
+    note = {"before": lengths[0], "after": lengths[-1], "transitions": 10 * len(lengths), "progress": progress}
+    return run(transitions, solved) | {"path_length": lengths[-1], "improvement": note if solved else None}
+
+
+def test_lengths_are_those_of_the_median_run_and_begin_where_half_of_the_runs_have_a_plan():
+    figure = length_figure({"maze": {"Ex": [improved(100, [50, 20]), improved(200, [40, 30, 10]),
+                                            improved(900, [99], solved=False)], "SST": [BROKEN]}})
+    (curve,) = figure.axes[0].lines
+    assert list(curve.get_xdata()) == [200, 210, 220, 230]
+    assert list(curve.get_ydata()) == [40, 30, 20, 20]
+
+
+def test_runs_that_were_not_improved_have_one_length():
+    figure = length_figure({"maze": {"Ex": [run(10)]}})
+    (curve,) = figure.axes[0].lines
+    assert (list(curve.get_xdata()), list(curve.get_ydata())) == ([10], [7])
+
+
+@pytest.mark.parametrize("draw", [distribution_figure, coverage_figure, length_figure])
 @pytest.mark.parametrize(("environments", "panels"), [(1, 1), (2, 2), (4, 4), (7, 7)])
 def test_every_environment_has_a_panel(draw, environments, panels):
     figure = draw({f"maze {number}": PLANNERS for number in range(environments)})

@@ -53,6 +53,21 @@ def test_warm_workers_give_the_results_of_a_fresh_process(tmp_path):
     assert (again.summary(), again.runs) == (found.summary(), found.runs)
 
 
+
+def test_plans_are_made_shorter_as_in_plan(tmp_path):
+    found = compare(["Ex"], MAZE, env_kwargs={"size": 3}, seeds=1, improve="50%", out=tmp_path / "out")
+    alone = plan(MAZE, "Ex", env_kwargs={"size": 3}, seed=0, improve="50%")
+    (record,) = found.runs
+    assert alone.improvement is not None
+    assert record["path_length"] == record["improvement"]["after"] == alone.improvement.after
+    assert record["improvement"]["before"] == alone.improvement.before > alone.improvement.after
+    assert record["transitions"] == alone.transitions
+    assert read_comparison(tmp_path / "out").runs == found.runs
+    assert read_toml(tmp_path / "out/config.toml")["improve"] == "50%"
+    with pytest.raises(RunFolderError):
+        compare(["Ex"], MAZE, env_kwargs={"size": 3}, seeds=1, out=tmp_path / "out")
+
+
 def test_every_run_of_a_planner_that_misbehaves_is_recorded_and_the_others_continue(misbehaving, tmp_path):
     """One that dies, raises, cannot be built, or uses too much memory; no limit of time is set."""
     reasons = {"misbehaving:Deadly": "the process died", "misbehaving:Broken": "RuntimeError: this planner is broken",

@@ -12,6 +12,7 @@ from pbcs_ompl.experiments.claims import greater
 from pbcs_ompl.experiments.studies.exploration_trees import study as trees
 from pbcs_ompl.experiments.studies.toy_analysis import study as toy
 from pbcs_ompl.experiments.studies.toy_analysis.random_walk import found_by
+from pbcs_ompl.experiments.studies.tree_pitfalls import study as pitfalls
 from pbcs_ompl.experiments.study import find_study, study_ids
 from pbcs_ompl.resettable import make
 
@@ -22,6 +23,8 @@ SMALL = {
         "variants": {"ddpg-epsilon-greedy": {"agent": "ddpg", "noise": "epsilon-greedy"},
                      "ddpg-ornstein-uhlenbeck": {"agent": "ddpg", "noise": "ornstein-uhlenbeck", "expert_after": 50}},
         "drift": {"seeds": 2, "updates": 100, "every": 50, "transitions": 100}},
+    "tree-pitfalls": {"paradox": {"ring": 16, "radius": 0.5, "expansions": 50}, "neighbours": {"sizes": [100, 300]},
+                      "growth": {"planners": ["Ex", "RRTNH"], "sizes": [300, 1000]}},
     "toy-analysis": {"walks": 20_000, "steps": 22, "toy": {"agents": 50, "initialisation": "glorot"}},
     "exploration-trees": {"scenes": {
         "box": {"env": "pbcs/Box-v0", "transitions": 300},
@@ -153,3 +156,16 @@ def test_greater_pairs_what_both_have(first, second, agrees):
     assert claim.agrees is agrees
     assert claim.numbers["greater"]["n"] == len(first)
     assert bool(claim.note) == (agrees is None)
+
+
+def test_a_k_d_tree_in_random_order_is_logarithmic_and_in_sorted_order_a_list():
+    rng = np.random.default_rng(0)
+    points = rng.random((4000, 2))
+    assert pitfalls.depths_in_kd_tree(points).mean() < 2.0 * np.log2(4000)
+    line = np.repeat(np.arange(100.0)[:, None], 2, axis=1)
+    np.testing.assert_array_equal(pitfalls.depths_in_kd_tree(line), np.arange(100))
+
+
+@pytest.mark.parametrize(("size", "steps"), [(2, 11), (3, 43)])
+def test_the_fewest_steps_through_a_maze(size, steps):
+    assert trees.fewest_steps(make("pbcs/Maze-v0", {"size": size})) == steps

@@ -81,7 +81,7 @@ def test_a_comparison(laboratory, call):
     folder = read_folder(Path("runs/comparison"))
     (planners, env), options = call(repeating(folder))
     task = {name: options[name] for name in ("env_kwargs", "goal", "feature", "start_seed")}
-    chosen = {name: options[name] for name in ("seeds", "max_transitions", "max_seconds", "max_memory")}
+    chosen = {name: options[name] for name in ("seeds", "max_transitions", "max_seconds", "max_memory", "improve")}
     sweep = make_sweep(planners, environment_specs(env, **task), **chosen)
     assert to_toml(sweep.config()) == to_toml(folder.config)
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import LogNorm
 
-from pbcs_ompl.experiments.claims import Claim, Rate, at_least, at_most, higher, no_higher, rate
+from pbcs_ompl.experiments.claims import Claim, Rate, at_least, at_most, greater, higher, no_higher, rate
 from pbcs_ompl.figures.by_group import rates_figure
 from pbcs_ompl.figures.canvas import QUANTITIES, publish
 from pbcs_ompl.figures.maze import legend_below, map_axes
@@ -23,7 +23,7 @@ def analyse(records: Records, figures: Path) -> list[Claim]:
     claims = []
     if trainings:
         _draw_rates(trainings, figures)
-        claims += [*_backplay(trainings), *_discount(trainings), *_shaping(trainings)]
+        claims += [*_backplay(trainings), *_discount(trainings), *_shaping(trainings), *_variants(trainings)]
     for record in alone[-1:]:
         _draw_visits(record, figures)
         claims.append(_never_found(record))
@@ -67,6 +67,20 @@ def _shaping(records: Records) -> list[Claim]:
     (sparse, shaped), (sparse_pb, shaped_pb) = rates("DDPG"), rates("PB")
     return [_more("the shaped reward makes DDPG alone succeed less often", sparse, shaped, "7.2.3"),
             _more("the shaped reward makes PB succeed more often", shaped_pb, sparse_pb, "7.2.3, Fig. 7.1")]
+
+
+def _variants(records: Records) -> list[Claim]:
+    """Compare PB's starts, its pretest and the sliding window, from the sparse reward with the low discount."""
+    pb, balls, untested, window = (_success_rate(records, label, discount=LOW) for label in (
+        "PB", "PB, starts in balls", "PB without pretest", "sliding window"))
+    spent, without = ({record["seed"]: float(record["transitions"]) for record in records
+                       if (record["label"], record["reward"], record["discount"]) == (label, "sparse", LOW)}
+                      for label in ("PB", "PB without pretest"))
+    return [_more("starts in balls make PB succeed more often than exact ones", ("balls", balls), ("exact", pb),
+                  "7.2.4"),
+            _more("PB succeeds more often than the sliding window of Backplay", ("PB", pb), ("window", window), "5.2"),
+            greater("PB takes more transitions without the pretest", without, spent, ("without", "with"),
+                    "[Matheron2020] 5.3, Fig. 5.1(b)").with_numbers(succeed_without=untested)]
 
 
 def _never_found(record: dict[str, Any]) -> Claim:

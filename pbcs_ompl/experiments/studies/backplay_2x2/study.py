@@ -19,12 +19,18 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
     """One run for each seed, reward, discount and method, and one of all seeds of DDPG alone."""
     chosen = range(sweep["first_seed"], sweep["first_seed"] + seeds)
     common = {key: sweep[key] for key in ("preset", "max_transitions")}
-    trainings = [{"name": f"{label}-{discount}-{reward}-{seed}", "label": label, "method": method, "reward": reward,
-                  "shaped": shaped, "discount": float(discount), "seed": seed, **common}
-                 for seed in chosen for label, method in sweep["methods"].items() for discount in sweep["discounts"]
-                 for reward, shaped in sweep["rewards"].items()]
+    trainings = [{"name": f"{_plain_name(label)}-{discount}-{reward}-{seed}", "label": label, "reward": reward,
+                  "method": way["method"], "discount": float(discount), "seed": seed, **common,
+                  "settings": {"shaped": shaped, "max_steps": EPISODE, "exact": True} | way.get("settings", {})}
+                 for seed in chosen for label, way in sweep["methods"].items()
+                 for discount in way.get("discounts", sweep["discounts"].values())
+                 for reward, shaped in sweep["rewards"].items() if reward in way.get("rewards", sweep["rewards"])]
     return [*trainings, {"name": f"alone-{seeds}", "label": "alone", "seeds": list(chosen), "preset": sweep["preset"],
                          **sweep["alone"]}]
+
+
+def _plain_name(label: str) -> str:
+    return label.replace(", ", "-").replace(" ", "-")
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
@@ -32,8 +38,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     if settings["label"] == "alone":
         return _alone(settings)
     record, _ = trained("pbcs/Maze-v0", MAZE, agent_settings={"discount": settings["discount"]},
-                        settings={"shaped": settings["shaped"], "max_steps": EPISODE},
-                        **{key: settings[key] for key in ("method", "preset", "seed", "max_transitions")})
+                        **{key: settings[key] for key in ("method", "settings", "preset", "seed", "max_transitions")})
     return settings | record
 
 

@@ -19,6 +19,8 @@ BINS = (0, 50, 100, 200, 400, 800, 1600)
 """Steps of the first reward that are distinguished, as powers of two of the longest episode."""
 MINI_BATCHES = 50 * 100
 """Transitions that are drawn after an episode without the reward: 50 mini-batches of 100."""
+OF_THE_THESIS = 6.03
+"""Rewards among them on average, in a failed seed of the thesis."""
 DRIFTING = 10
 """Seeds in the picture of drift, as in the thesis."""
 
@@ -104,8 +106,12 @@ def _draw_rewarded(variants: dict[str, Variant], figures: Path) -> None:
                                                                    len(chosen.steps))[:, chosen.failed_with_reward]
               for chosen in failed.values()}
     for chosen in list(failed.values())[:1]:
-        publish(curves_figure(chosen.steps.astype(np.float64), panels, xlabel="steps", title=title),
-                figures / "rewarded.png")
+        figure = curves_figure(chosen.steps.astype(np.float64), panels, xlabel="steps", title=title)
+        for axes in figure.axes:
+            axes.axhline(OF_THE_THESIS, color="black", linestyle=":", linewidth=1.2,
+                         label=f"[Matheron2020]: {OF_THE_THESIS:g}")
+            axes.legend(frameon=False, fontsize=9)
+        publish(figure, figures / "rewarded.png")
 
 
 def _draw_critic(variant: str, name: str, one: dict[str, Any], figures: Path) -> None:

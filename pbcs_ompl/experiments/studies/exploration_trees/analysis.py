@@ -15,6 +15,7 @@ FIGURES = {("box", "RRTSteered"): "3.2a", ("box", "RRTNH"): "3.3a", ("box", "Ex"
            ("disc", "RRTSteered"): "3.2b", ("disc", "RRTNH"): "3.3b", ("disc", "Ex"): "3.4b",
            ("maze", "RRTNH"): "4.3", ("maze", "Ex"): "4.3"}
 """Which figure of [Matheron2020] a tree is like."""
+NAMES = {"RRTSteered": "RRT", "RRTNH": "RRT-NH"}
 
 
 def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
@@ -90,19 +91,21 @@ def _longer_than_optimal(records: list[dict[str, Any]]) -> list[Claim]:
 def _draw_trees(record: dict[str, Any], figures: Path) -> None:
     model = make(record["env"], record.get("env_kwargs", {}))
     name = f"{record['scene']}-{record['planner']}"
-    title = f"{record['planner']}, {record['transitions']:,} transitions: evenness {record['evenness']:.2f}"
+    planner = NAMES.get(record["planner"], record["planner"])
+    title = f"{planner}, {record['transitions']:,} transitions: evenness {record['evenness']:.2f}"
     number = FIGURES.get((record["scene"], record["planner"]))
     publish(tree_figure(model, np.array(record["states"]), np.array(record["parents"]),
                      title=f"{title} (Fig. {number})" if number else title), figures / f"{name}.png")
     if "path" in record:
-        title = f"{record['planner']} up to the first reward: {record['first_reward']:,} transitions (Fig. 4.2)"
+        title = f"{planner} up to the first reward: {record['first_reward']:,} transitions (Fig. 4.2)"
         publish(tree_figure(model, np.array(record["found_states"]), np.array(record["found_parents"]),
                          path=np.array(record["path"]), title=title), figures / f"{name}-first-reward.png")
 
 
 def _draw_evenness(records: list[dict[str, Any]], figures: Path) -> None:
     scenes, planners = (list(dict.fromkeys(record[key] for record in records)) for key in ("scene", "planner"))
-    publish(values_figure({planner: {scene: list(_values(records, scene, planner, "evenness").values())
-                                  for scene in scenes} for planner in planners},
-                       ylabel="evenness of the tree", title="How evenly trees fill what can be reached (1: uniform)"),
+    publish(values_figure({NAMES.get(planner, planner): {
+        scene: list(_values(records, scene, planner, "evenness").values()) for scene in scenes}
+                           for planner in planners},
+                       ylabel="evenness of the tree", title="How evenly trees fill what can be reached (1: even)"),
          figures / "evenness.png")
