@@ -23,7 +23,8 @@ class Variant:
     def __init__(self, records: list[dict[str, Any]]):
         loop = records[0]["loop"]
         self.records, self.expert_after = records, records[0]["expert_after"]
-        self.name = NAMES.get(records[0]["variant"], records[0]["variant"])
+        variant = str(records[0]["variant"])
+        self.name = NAMES.get(variant, variant)
         self.steps, self.success = joined_success(records, loop["steps"], loop["evaluate_every"])
         self.first = joined_first_rewards(records)
         self.failed = ~self.success[-1]

@@ -55,9 +55,10 @@ def _samples_outside(records: list[dict[str, Any]]) -> list[Claim]:
         box, disc = (_values(records, scene, planner, "density") for scene in ("box", "disc"))
         twice = {seed: 2.0 * value for seed, value in box.items()}
         pair = (disc, twice) if denser else (twice, disc)
-        names = ("in the disc", "twice that in the box")
+        inside, doubled = "in the disc", "twice that in the box"
+        names = (inside, doubled) if denser else (doubled, inside)
         claims.append(greater(f"inside the disc the tree of {name} is {'more' if denser else 'less'} than twice as "
-                              "dense as there in the box", *pair, names if denser else names[::-1], source))
+                              "dense as there in the box", *pair, names, source))
     return claims
 
 
@@ -104,7 +105,7 @@ def _draw_trees(record: dict[str, Any], figures: Path) -> None:
 
 def _draw_evenness(records: list[dict[str, Any]], figures: Path) -> None:
     scenes, planners = (list(dict.fromkeys(record[key] for record in records)) for key in ("scene", "planner"))
-    publish(values_figure({NAMES.get(planner, planner): {
+    publish(values_figure({NAMES.get(str(planner), str(planner)): {
         scene: list(_values(records, scene, planner, "evenness").values()) for scene in scenes}
                            for planner in planners},
                        ylabel="evenness of the tree", title="How evenly trees fill what can be reached (1: even)"),

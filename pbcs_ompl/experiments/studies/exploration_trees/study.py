@@ -55,7 +55,7 @@ def fewest_steps(model: ResettableModel, spacing: float = 0.025) -> int | None:
         spacing: Of the lattice.
     """
     reach = round(float(model.action_high[0]) / spacing)
-    line = np.arange(-reach, reach + 1) * spacing
+    line = np.arange(-reach, reach + 1, dtype=np.float64) * spacing
     moves = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
     start = model.initial_state(0)
     front, seen = start[None], {(0, 0)}

@@ -83,7 +83,7 @@ def _draw(neighbours: Records, growth: Records, figures: Path) -> None:
     for planner in dict.fromkeys(record["planner"] for record in growth):
         some = [record for record in growth if record["planner"] == planner]
         _line(right, np.array(some[0]["sizes"][1:], dtype=np.float64),
-              1e6 * np.array([_per_expansion(record) for record in some]), NAMES.get(planner, planner))
+              1e6 * np.array([_per_expansion(record) for record in some]), NAMES.get(str(planner), str(planner)))
     right.set(xscale="log", yscale="log", xlabel="transitions", ylabel="microseconds of an expansion",
               title="What an expansion costs (3.3.2)")
     for axes in (left, right):
