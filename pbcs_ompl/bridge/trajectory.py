@@ -167,16 +167,17 @@ class Trajectory:
         except ModuleNotFoundError as error:
             raise MissingDependency('data sets of Minari need minari: pip install "pbcs-ompl[minari]"') from error
         opened = minari.load_dataset(dataset) if isinstance(dataset, str) else dataset
-        if env is None and opened.env_spec is None:
-            raise Mismatch("the data set names no environment; give env")
+        if env is None:
+            if opened.env_spec is None:
+                raise Mismatch("the data set names no environment; give env")
+            env = EnvSpec(opened.env_spec.id, opened.env_spec.kwargs)
         (found,) = opened.iterate_episodes([episode])
         (words,) = opened.storage.get_episode_metadata([episode])
         seed = words.get("seed")
         if seed is None:
             raise Mismatch(f"episode {episode} has no seed, so its start is unknown; use Trajectory.from_arrays with "
                            "first_state")
-        task = EnvSpec(opened.env_spec.id, opened.env_spec.kwargs) if env is None else env
-        made = cls.from_arrays(task, found.actions, reset_seed=int(seed), goal=goal, feature=feature,
+        made = cls.from_arrays(env, found.actions, reset_seed=int(seed), goal=goal, feature=feature,
                                source=f"minari episode {episode}")
         made._check_observed(make(made.environment), found.observations)
         return made

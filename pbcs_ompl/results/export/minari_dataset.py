@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from pbcs_ompl.core.errors import MissingDependency
 from pbcs_ompl.results.export.episodes import Episode, Recorder, stacked
@@ -27,14 +28,15 @@ def write_minari(recorder: Recorder, episodes: Sequence[Episode], folder: Path) 
     try:
         import h5py  # noqa: F401  what Minari keeps data in
         import minari
-        from minari.data_collector import EpisodeBuffer
+        from minari import data_collector
     except ModuleNotFoundError as error:
         raise MissingDependency('data sets of Minari need minari: pip install "pbcs-ompl[minari]"') from error
+    buffer: Any = data_collector.EpisodeBuffer  # arrays will do, whatever its types say
     sources = list(dict.fromkeys(episode.source for episode in episodes))
     with write_errors(folder), _root(folder), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of Minari, about authors that it is not given
         for source in sources:
-            buffers = [EpisodeBuffer(
+            buffers = [buffer(
                 id=index, seed=episode.reset_seed, options=recorder.model.spec.reset_options,
                 observations=stacked(episode.observations), actions=episode.actions, rewards=episode.rewards.tolist(),
                 terminations=episode.terminated.tolist(), truncations=_cut(episode),
