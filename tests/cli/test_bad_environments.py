@@ -82,7 +82,7 @@ def complaint(words: str, status: int, capsys: pytest.CaptureFixture[str]) -> st
 @pytest.mark.parametrize("verb", ["plan", "doctor"])
 @pytest.mark.parametrize(("name", "message"), [
     ("Named", "expected a Box, Discrete, MultiDiscrete or MultiBinary; map one to these actions inside"),
-    ("Noisy", "so its steps are random: fresh instances differ in observation"),
+    ("Noisy", "so its steps are random, or depend on what is outside of it: fresh instances differ in observation"),
     ("Stacked", "FrameStackObservation has a memory or noise that a restored state would not bring back; leave it out"),
     ("Normalised", "NormalizeObservation has a memory or noise"),
 ])
