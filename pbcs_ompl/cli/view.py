@@ -3,6 +3,7 @@
 import webbrowser
 from argparse import Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.bridge.tree import load_tree
@@ -14,7 +15,9 @@ from pbcs_ompl.figures.scene import GENERATOR, scene_page
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.files import CHAIN, TRAJECTORY, TREE, VIEW, check_replaceable, write_atomically, write_errors
 from pbcs_ompl.results.folder import read_folder
-from pbcs_ompl.skills.load_chain import load_chain
+
+if TYPE_CHECKING:
+    from pbcs_ompl.skills.trained_controller import TrainedController
 
 KINDS = ("plan", "train")
 
@@ -31,7 +34,7 @@ def run(arguments: Namespace) -> int:
     model = make(EnvSpec.from_dict(found.config["environment"], trusted=arguments.trust))
     tree = load_tree(folder / TREE) if (folder / TREE).is_file() else None
     path = Trajectory.load(folder / TRAJECTORY, trust=arguments.trust) if (folder / TRAJECTORY).is_file() else None
-    chain = load_chain(folder / CHAIN, trust=arguments.trust) if (folder / CHAIN).is_dir() else None
+    chain = _chain(folder / CHAIN, trust=arguments.trust) if (folder / CHAIN).is_dir() else None
     rollout = None if chain is None else chain.rollout(model)
     text = scene_page(model, tree=tree, path=None if path is None else path.states, rollout=rollout,
                       activations=() if chain is None else chain.circles)
@@ -43,3 +46,9 @@ def run(arguments: Namespace) -> int:
     if arguments.open:
         webbrowser.open(page.resolve().as_uri())
     return 0
+
+
+def _chain(folder: Path, *, trust: bool) -> "TrainedController":
+    from pbcs_ompl.skills.load_chain import load_chain  # here, because it needs torch, and plans do not
+
+    return load_chain(folder, trust=trust)

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,8 @@ def test_without_torch_there_are_plans_and_the_rest_is_named(tmp_path: Path) -> 
     assert demo.returncode == 0, demo.stderr
     assert 'pip install "pbcs-ompl[rl]"' in demo.stderr
     assert (tmp_path / "demo/tree.png").is_file()
+    viewed = without_torch(["view", "demo"], tmp_path)
+    assert viewed.returncode == (0 if find_spec("viser") else 3), viewed.stderr
     compared = without_torch(["compare", "--planners", "Ex", "--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 2}',
                               "--seeds", "1"], tmp_path)
     assert compared.returncode == 0, compared.stderr
