@@ -156,7 +156,7 @@ class _Improver:
                     finally:
                         saved[move] += before - len(self._best)
                         spent[move] += self._counter.count - made
-        except BudgetUsedUp:
+        except BudgetUsedUp:  # the allowance ended within a move: what was found before it stays
             pass
         best, given, seconds = self._best, self._given, time.perf_counter() - self._began
         found = Improvement(given.length, len(best), self._counter.count, seconds, self._progress)
