@@ -15,6 +15,6 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
     """Train once."""
-    record, _ = trained("pbcs/Maze-v0", {"size": settings["size"]},
+    record, _ = trained("pbcs/Maze-v0", {"size": settings["size"]}, method="pbcs", planner="Ex",
                         **{key: settings[key] for key in ("preset", "seed", "max_transitions")})
     return settings | record
