@@ -1,4 +1,4 @@
-"""Rates and values of many named rows: the names down the side, one panel for each quantity, one colour for each series."""
+"""Rates and values of many named rows: names down the side, a panel for each quantity, a colour for each series."""
 
 from collections.abc import Mapping, Sequence
 
@@ -26,25 +26,20 @@ def rows_figure(rates: Mapping[str, Rates], values: Mapping[str, Values], *, tit
         title: Above all.
         log: The names of the panels of values whose axis is logarithmic.
     """
-    panels = [*rates.values(), *values.values()]
-    rows = list(dict.fromkeys(row for panel in panels for series in panel.values() for row in series))
-    figure, grid = new_panels(1, len(panels), 3.0 + 2.9 * len(panels), 1.6 + ROW_INCHES * len(rows))
-    for axes, (name, panel) in zip(grid, rates.items(), strict=False):
-        for series, (label, columns) in enumerate(panel.items()):
-            for row, (successes, trials) in columns.items():
-                if trials:
-                    _mark(axes, _place(rows.index(row), series, len(panel)), successes / trials,
-                          wilson(successes, trials), series)
-            axes.plot([], [], "o", color=colour(series), label=f"{label} (N = {_counts([n for _, n in columns.values()])})")
+    rows = list(dict.fromkeys(row for panel in [*rates.values(), *values.values()] for series in panel.values()
+                              for row in series))
+    count = len(rates) + len(values)
+    figure, grid = new_panels(1, count, 3.0 + 2.9 * count, 1.6 + ROW_INCHES * len(rows))
+    for axes, (name, counts) in zip(grid, rates.items(), strict=False):
+        for series, (label, pairs) in enumerate(counts.items()):
+            _draw_rates(axes, {_place(rows.index(row), series, len(counts)): pair for row, pair in pairs.items()},
+                        label, colour(series))
         axes.set_xlim(-0.04, 1.04)
-        axes.set_xlabel(f"{name} (95 % Wilson)")
+        axes.set_xlabel(f"{name}\n(95 % Wilson)")
     for axes, (name, panel) in zip(grid[len(rates):], values.items(), strict=True):
         for series, columns in enumerate(panel.values()):
-            for row, column in columns.items():
-                if len(column):
-                    place = _place(rows.index(row), series, len(panel))
-                    axes.plot(column, np.full(len(column), place), ".", color=colour(series), alpha=0.35)
-                    _mark(axes, place, float(np.median(column)), median_interval(column), series)
+            _draw_values(axes, {_place(rows.index(row), series, len(panel)): column for row, column in columns.items()},
+                         colour(series))
         axes.set_xscale("log" if name in log else "linear")
         axes.set_xlabel(f"{name}\n(medians, 95 % bootstrap)")
     for index, axes in enumerate(grid):
@@ -56,15 +51,29 @@ def rows_figure(rates: Mapping[str, Rates], values: Mapping[str, Values], *, tit
     return figure
 
 
-def _mark(axes: Axes, place: float, middle: float, ends: tuple[float, float], series: int) -> None:
-    axes.hlines(place, *ends, color=colour(series), linewidth=1.2)
-    axes.plot(middle, place, "o", color=colour(series), markersize=4.5)
+def _draw_rates(axes: Axes, pairs: Mapping[float, tuple[int, int]], label: str, shade: str) -> None:
+    """Draw (successes, trials) at their heights."""
+    trials = [count for _, count in pairs.values()]
+    for place, (successes, count) in pairs.items():
+        if count:
+            axes.hlines(place, *wilson(successes, count), color=shade, linewidth=1.2)
+            axes.plot(successes / count, place, "o", color=shade, markersize=4.5)
+    axes.plot([], [], "o", color=shade, label=f"{label} (N = {_range(trials)})")
+
+
+def _draw_values(axes: Axes, columns: Mapping[float, Sequence[float]], shade: str) -> None:
+    """Draw values at their heights."""
+    for place, column in columns.items():
+        if len(column):
+            axes.plot(column, np.full(len(column), place), ".", color=shade, alpha=0.35)
+            axes.hlines(place, *median_interval(column), color=shade, linewidth=1.2)
+            axes.plot(np.median(column), place, "o", color=shade, markersize=4.5)
 
 
 def _place(row: int, series: int, count: int) -> float:
     return row + 0.22 * (series - (count - 1) / 2)
 
 
-def _counts(trials: Sequence[int]) -> str:
+def _range(trials: Sequence[int]) -> str:
     low, high = min(trials, default=0), max(trials, default=0)
     return str(low) if low == high else f"{low} to {high}"

@@ -12,7 +12,7 @@ from pbcs_ompl.figures.canvas import BAND, QUANTITIES, RED, colour, new_panels
 HALF = 0.5
 """Where all rates but the first are above this one, the scale begins here."""
 ENLARGED, SMALLEST_SPAN = 0.02, 1e-3
-"""An enlarged slice shows this share of the range of Q on each side of the actor's values, and no less than the second."""
+"""An enlarged slice shows this share of the range of Q on each side of the actor's values, or the second number."""
 
 
 Curves = Mapping[str, tuple[IndexArray, BoolArray]]
@@ -62,7 +62,7 @@ def curves_figure(steps: Array, panels: Mapping[str, Array], *, title: str = "",
 
 def stuck_critic_figure(states: Array, actions: Array, values: Array, chosen: Array, *, sliced: Sequence[float],
                         title: str = "") -> Figure:
-    """Draw Q over a line of states and one dimension of the action, and slices of it, whole and enlarged around the actor.
+    """Draw Q over a line of states and one dimension of the action, and slices of it, whole and enlarged.
 
     These are [Matheron2020] Figs. 6.5(a), 6.5(b) and 6.9(b).
 

@@ -25,7 +25,8 @@ SMALL = {
                      "ddpg-ornstein-uhlenbeck": {"agent": "ddpg", "noise": "ornstein-uhlenbeck", "expert_after": 50}},
         "drift": {"seeds": 2, "updates": 100, "every": 50, "transitions": 100}},
     "tree-pitfalls": {"paradox": {"ring": 16, "radius": 0.5, "expansions": 50}, "neighbours": {"sizes": [100, 300]},
-                      "growth": {"planners": ["Ex", "RRTNH"], "sizes": [300, 1000]}},
+                      "growth": {"planners": ["Ex", "RRTNH"], "sizes": [300, 1000]},
+                      "est": {"sizes": [2], "max_transitions": 3000}},
     "toy-analysis": {"walks": 20_000, "steps": 22, "toy": {"agents": 50, "initialisation": "glorot"}},
     "exploration-trees": {"scenes": {
         "box": {"env": "pbcs/Box-v0", "transitions": 300},

@@ -23,12 +23,12 @@ HALF_WALL = 0.05
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
-    """One run for each stack of each variant, and one of mini-batches."""
+    """One run for each stack of each variant, the first seeds of all variants first, and one of mini-batches."""
     common = {key: sweep[key] for key in ("evaluate_every", "episode_steps", "device")}
-    by_variant = [[{"name": f"{variant}-{chunk[0]}-{chunk[-1]}", "variant": variant, "seeds": chunk, **common, **options,
+    stacks = [{"name": f"{variant}-{chunk[0]}-{chunk[-1]}", "variant": variant, "seeds": chunk, **common, **options,
                "agent": sweep["agent"] | options.get("agent", {})}
-                   for chunk in chunks(seeds, sweep["stack"])] for variant, options in sweep["variants"].items()]
-    stacks = [one for same_seeds in zip(*by_variant, strict=True) for one in same_seeds]
+              for variant, options in sweep["variants"].items() for chunk in chunks(seeds, sweep["stack"])]
+    stacks.sort(key=lambda settings: settings["seeds"][0])
     return [*stacks, {"name": f"mini-batch-{seeds}", "variant": "mini-batch", "seeds": list(range(seeds)),
                       **sweep["mini_batch"]}]
 

@@ -72,7 +72,8 @@ def _ends(runs: Records) -> dict[str, Any]:
     """Return how much of the plan is covered at the end, and how many chains are complete but fail with noise."""
     covered = {f"{size}x{size}": round(float(np.median([r["covered"] for r in runs if r["size"] == size])), 3)
                for size in _sizes(runs)}
-    return {"covered, median": covered, "complete, but not solved": sum(r["complete"] and not r["solved"] for r in runs)}
+    failing = sum(r["complete"] and not r["solved"] for r in runs)
+    return {"covered, median": covered, "complete, but not solved": failing}
 
 
 def _saves(claim: str, more: Records, less: Records) -> Claim:

@@ -13,14 +13,14 @@ FIRST, ALL_BUT = "first", "all-but"
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
-    """One run for each seed, size and row; those with the networks of the thesis, which are slow, come last."""
-    changes, slow_seeds = sweep["changes"], sweep["networks_of_the_thesis"]["seeds"]
+    """One run for each seed, size and row; those with an update for each transition or large networks come last."""
+    changes, slow_seeds = sweep["changes"], sweep["slow"]["seeds"]
     names = list(changes)
     rows = [(FIRST, count, names[:count]) for count in range(len(names) + 1)]
     # All but the last change are the first ones.
     rows += [(ALL_BUT, count, names[:count - 1] + names[count:]) for count in range(1, len(names))]
     chosen = [{"name": f"{kind}-{count}-{size}-{index}", "kind": kind, "count": count, "changes": names, "size": size,
-               "seed": sweep["first_seed"] + index, "slow": names[0] not in made,
+               "seed": sweep["first_seed"] + index, "slow": not {*names[:2]} <= {*made},
                "changed": [setting for name in made for setting in changes[name]],
                **{key: sweep[key] for key in ("planner", "max_transitions")}}
               for index in range(seeds) for size in sweep["sizes"] for kind, count, made in rows]
