@@ -66,12 +66,12 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.render_mode = inner.render_mode
         self.action_space = inner.action_space
         self._head, self._distance = np.empty(0), 1.0
-        self._has_goal_distance = False
+        self.has_goal_distance = False
         self._saves = 0
         self.named: Any = None
         observation, _ = self.reset(seed=0)
         self.observation_space = Box(-np.inf, np.inf, observation.shape, np.float64)
-        self.goal_threshold = self.goal_radius if self._has_goal_distance else 0.5
+        self.goal_threshold = self.goal_radius if self.has_goal_distance else 0.5
         saved = len(self.save())
         self.feature_dims = tuple(range(len(self._head)))
         self.feature_periods = self._periods()
@@ -243,7 +243,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
             raise CallbackFailed("the feature function returned no numbers")
         success = self.is_success(outcome)
         reported = None if self.goal_rule is not None else self.reported_goal_distance(self.named)
-        self._has_goal_distance = reported is not None
+        self.has_goal_distance = reported is not None
         if reported is None:
             self._distance = 0.0 if success else 1.0
         else:

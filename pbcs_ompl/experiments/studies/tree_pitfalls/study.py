@@ -10,7 +10,7 @@ from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.planners.est_adapted import RULES
 from pbcs_ompl.resettable import make
-from pbcs_ompl.skills.exploration import without_goal
+from pbcs_ompl.resettable.without_goal import without_goal
 
 BOX = "pbcs/Box-v0"
 MEASURES = ("nodes nearby", "edges that leave nodes nearby")
