@@ -8,10 +8,9 @@ import numpy as np
 from pbcs_ompl.core.statistics import median_interval
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.experiments.claims import Claim, greater, rate
-from pbcs_ompl.experiments.studies.tree_pitfalls.study import MEASURES
+from pbcs_ompl.experiments.studies.tree_pitfalls.study import EST_RULES, MEASURES
 from pbcs_ompl.figures.by_group import values_figure
 from pbcs_ompl.figures.canvas import BAND, new_panels, publish
-from pbcs_ompl.planners.est_adapted import RULES
 
 Records = list[dict[str, Any]]
 NAMES = {"RRTNH": "RRT-NH"}
@@ -80,9 +79,9 @@ def _growth(records: Records) -> list[Claim]:
 def _est(records: Records) -> list[Claim]:
     """Compare the rule of the text of 3.2 with that of its figure; an unsolved run counts as the whole budget."""
     costs = {rule: {(r["size"], r["seed"]): float(r["transitions"] if r["solved"] else r["max_transitions"])
-                    for r in records if r["rule"] == rule} for rule in RULES}
+                    for r in records if r["rule"] == rule} for rule in EST_RULES}
     solved = {f"solved, {rule}": rate(sum(r["solved"] for r in records if r["rule"] == rule),
-                                      len(costs[rule])) for rule in RULES}
+                                      len(costs[rule])) for rule in EST_RULES}
     return [greater("EST needs more transitions when it draws nodes by 1 / omega than when it takes one with the "
                     "least omega", costs["draw"], costs["least"], ("draw", "least"),
                     "[Matheron2020] 3.2: its text and Fig. 3.5 contradict each other").with_numbers(**solved)]
@@ -91,7 +90,7 @@ def _est(records: Records) -> list[Claim]:
 def _draw_est(records: Records, figures: Path) -> None:
     groups = {f"EST, {rule}": {f"{size}x{size}": [r["transitions"] for r in records
                                                   if (r["rule"], r["size"]) == (rule, size) and r["solved"]]
-                               for size in sorted({r["size"] for r in records})} for rule in RULES}
+                               for size in sorted({r["size"] for r in records})} for rule in EST_RULES}
     publish(values_figure(groups, ylabel="transitions to the goal", log=True,
                           title="EST's two rules: a node drawn by 1 / ω, or one with the least ω (3.2)"),
             figures / "est-rules.png")

@@ -8,13 +8,15 @@ import numpy as np
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.compiled import njit
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.planners.est_adapted import RULES
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.without_goal import without_goal
 
 BOX = "pbcs/Box-v0"
 MEASURES = ("nodes nearby", "edges that leave nodes nearby")
 """Of the density around a node: what leads to the paradox, and that of Ex ([Matheron2020] 3.3.1, third approach)."""
+
+EST_RULES = ("draw", "least")
+"""Options of ESTAdapted: the rules of Fig. 3.5 and of the text of 3.2."""
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
@@ -24,7 +26,7 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
     kinds += [{"kind": "growth", "planner": planner, "sizes": sweep["growth"]["sizes"]}
               for planner in sweep["growth"]["planners"]]
     kinds += [{"kind": "est", "rule": rule, "size": size, "max_transitions": sweep["est"]["max_transitions"]}
-              for size in sweep["est"]["sizes"] for rule in RULES]
+              for size in sweep["est"]["sizes"] for rule in EST_RULES]
     return [{"name": f"{kind['kind']}-{index}-{seed}", "seed": seed, **kind}
             for seed in range(seeds) for index, kind in enumerate(kinds)]
 
