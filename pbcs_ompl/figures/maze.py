@@ -32,7 +32,7 @@ def draw_map(axes: Axes, model: ResettableModel) -> None:
     """Draw the model's walls and goal into axes, at equal scale.
 
     Raises:
-        Mismatch: as `stage`.
+        Mismatch: the feature has fewer than two dimensions.
     """
     if len(model.feature_low) < 2:
         raise Mismatch(f"a picture needs two feature dimensions, {model.spec.id} has {len(model.feature_low)}")
