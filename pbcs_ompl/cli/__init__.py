@@ -64,30 +64,30 @@ def _run(words: list[str]) -> int:
 
 
 def _dispatch(words: list[str]) -> int:
-    """Parse and run a command; only the parser may end it, after --help and --version."""
+    """Parse and run a command; only the parser may end it, after --help and --version.
+
+    Raises:
+        MissingDependency: it needs what only training needs, and that is not installed.
+    """
     arguments = parse(build_parser(), words)
     if _imports(arguments) and "" not in sys.path:
         sys.path.append("")  # `--planner my_module:MyPlanner` finds a module in the working directory
     try:
         return int(_import(arguments.verb).run(arguments))
+    except ModuleNotFoundError as error:
+        if error.name not in OF_TRAINING:
+            raise
+        remedy = 'pip install "pbcs-ompl[rl]"'
+        raise MissingDependency(f"pbcs {arguments.verb} needs {error.name} for this: {remedy}") from error
     except SystemExit as error:
         raise PbcsError(f"code that pbcs {arguments.verb} has called left with sys.exit({error.code!r})") from error
 
 
 def _import(verb: str) -> ModuleType:
-    """Return the module of a verb; a signal waits, since an exception within an import of OMPL ends the process.
-
-    Raises:
-        MissingDependency: it needs what only training needs, and that is not installed.
-    """
+    """Return the module of a verb; a signal waits, since an exception within an import of OMPL ends the process."""
     stops: list[KeyboardInterrupt] = []
     with interruptible(stops.append), no_collection():
-        try:
-            module = import_module(f"pbcs_ompl.cli.{verb}")
-        except ModuleNotFoundError as error:
-            if error.name not in OF_TRAINING:
-                raise
-            raise MissingDependency(f'pbcs {verb} needs {error.name}: pip install "pbcs-ompl[rl]"') from error
+        module = import_module(f"pbcs_ompl.cli.{verb}")
     gc.freeze()  # what was imported stays: no collection needs to look at it
     if stops:
         raise stops[0]

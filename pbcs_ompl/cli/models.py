@@ -6,7 +6,11 @@ from pbcs_ompl.cli.streams import print_error
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.feature_bounds import narrow_words
+
+TINY = 1e-30
+"""Smaller numbers are the width of rounding around a bound of 0."""
 
 
 def describe(model: ResettableModel) -> dict[str, Any]:
@@ -29,7 +33,9 @@ def feature_words(model: ResettableModel) -> str:
 def goal_words(model: ResettableModel) -> str:
     """Return what a success is."""
     rule = model.spec.goal or "what the environment reports"
-    return f"{rule} (distance < {model.goal_threshold:g})"
+    env = model.env
+    measured = env.has_goal_distance if isinstance(env, RestorableEnv) else not isinstance(env, SuccessFlagEnv)
+    return f"{rule} (distance < {model.goal_threshold:g})" if measured else rule
 
 
 def note_rules(model: ResettableModel) -> None:
@@ -39,4 +45,4 @@ def note_rules(model: ResettableModel) -> None:
 
 
 def _vector(values: Array) -> str:
-    return "[" + ", ".join(f"{value:.3g}" for value in values) + "]"
+    return "[" + ", ".join(f"{0.0 if abs(value) < TINY else value:.3g}" for value in values) + "]"

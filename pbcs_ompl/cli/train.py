@@ -122,9 +122,9 @@ def _names_modules(arguments: Namespace) -> bool:
 
 
 def _closing_lines(arguments: Namespace, result: TrainResult, out: Path) -> list[tuple[str, str]]:
-    effort = (f"{format_number(result.plan_transitions)} transitions of planning, "
-              f"{format_number(result.train_transitions)} of training, {format_number(result.updates)} updates, "
-              f"{format_duration(result.seconds)}")
+    planned = f"{format_number(result.plan_transitions)} of planning, " if result.plan_transitions else ""
+    effort = (f"transitions: {planned}{format_number(result.train_transitions)} of training; "
+              f"{format_number(result.updates)} updates, {format_duration(result.seconds)}")
     lines = [("solved" if result.solved else "not solved", effort)]
     if result.chain is not None:
         lines.append(("chain", f"{result.chain.num_policies} skills"))

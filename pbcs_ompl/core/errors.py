@@ -25,10 +25,17 @@ class PbcsError(Exception):
 
 
 class UnknownName(PbcsError):
-    """A name that no registry knows."""
+    """A name that no registry knows.
 
-    def __init__(self, kind: str, name: str, choices: Iterable[str]):
-        super().__init__(f"unknown {kind} {name!r}{did_you_mean(name, choices)}")
+    Args:
+        kind: What it should name.
+        name: The name.
+        choices: Those that are known; the closest one is suggested.
+        remedy: What else to try.
+    """
+
+    def __init__(self, kind: str, name: str, choices: Iterable[str], remedy: str = ""):
+        super().__init__(f"unknown {kind} {name!r}{did_you_mean(name, choices)}{remedy}")
 
 
 class InvalidOption(PbcsError):

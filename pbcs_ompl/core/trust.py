@@ -5,7 +5,7 @@ name means it. A name that was read from a file is refused, unless the user says
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from pbcs_ompl.core.errors import UntrustedModule
@@ -30,6 +30,13 @@ def module_names(values: Any) -> Iterator[str]:
             waiting += value.values()
         elif isinstance(value, list | tuple):
             waiting += value
+
+
+def config_modules(values: Mapping[str, Any]) -> list[str]:
+    """Return the names in a config.toml, but for its environment, that import a module."""
+    direct = [values.get("planner"), values.get("agent")]
+    named = [name for name in direct if isinstance(name, str) and is_module_name(name)]
+    return [*named, *module_names([values.get(key) for key in ("planner_kwargs", "agent_settings", "settings")])]
 
 
 def refuse_modules(source: str, names: Iterable[str]) -> None:

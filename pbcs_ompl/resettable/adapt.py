@@ -13,12 +13,13 @@ from pbcs_ompl.resettable.adapters.classic import VectorEnv
 from pbcs_ompl.resettable.adapters.get_set import GetSetStateModel
 from pbcs_ompl.resettable.adapters.mujoco import MujocoEnv, MujocoModel
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
-from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
+from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv, knows_bounds
 from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
 from pbcs_ompl.resettable.attributes import EnvAttributes, misspelt
 from pbcs_ompl.resettable.families import proved, restorable
 from pbcs_ompl.resettable.fresh import EnvMaker, episode_limit, fresh_maker, spec_of
 from pbcs_ompl.resettable.memory.uncovered import refuse_uncovered
+from pbcs_ompl.resettable.observing import state_observer
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.resettable.simulation import simulation_of
 from pbcs_ompl.resettable.supported import TaskMaker, task_env, task_maker
@@ -103,10 +104,10 @@ def _choose(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None) -
 
 
 def _get_set(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None) -> ResettableModel:
-    if goal is not None or feature is not None:
+    offers = EnvAttributes.of(inner)
+    if goal is not None or feature is not None or not _is_complete(inner, offers):
         refuse_uncovered(inner)
         return _model_of(proved(VectorEnv(inner, goal, feature), make_inner))
-    offers = EnvAttributes.of(inner)
     model = GetSetStateModel(inner if offers.goal_distance is not None else SuccessFlagEnv(inner, offers))
     refuse_uncovered(inner)
     proved(model.env, make_inner)
@@ -114,6 +115,11 @@ def _get_set(inner: Any, goal: Any, feature: Any, make_inner: TaskMaker | None) 
         return _as_model(model)
     model.spec = spec_of(inner)
     return _as_model(model)
+
+
+def _is_complete(inner: Any, offers: EnvAttributes) -> bool:
+    """Return whether bounds and observations of all states are known."""
+    return state_observer(inner, offers) is not None and knows_bounds(inner, offers)
 
 
 def _warn_of_misspelt(env: Any) -> None:

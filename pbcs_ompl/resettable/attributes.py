@@ -36,7 +36,7 @@ class EnvAttributes:
     state_high: Array | None = _optional("as `state_low`", "upper bounds of the state [D]")
     capabilities: frozenset[Capability] | None = _optional("what the bounds suggest",
                                                            'a set of "visited", "arbitrary", "exact"')
-    observe: Callable[[Array], Array] | None = _optional("the state is the observation",
+    observe: Callable[[Array], Array] | None = _optional("what was seen is kept",
                                                          "observations [B, O] of states [B, D]")
     is_valid: Callable[[Array], BoolArray] | None = _optional("within the bounds", "which states [B, D] are valid [B]")
     goal_distance: Callable[[Array], Array] | None = _optional('`info["is_success"]`',

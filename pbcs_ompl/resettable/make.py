@@ -8,6 +8,7 @@ from contextlib import redirect_stderr
 from dataclasses import replace
 from functools import cache, partial
 from importlib import import_module
+from importlib.util import find_spec
 from io import StringIO
 from typing import Any
 
@@ -27,6 +28,8 @@ from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 
 KNOWN_TO_FAIL = ("Fetch", "Hand", "FrankaKitchen", "MaMuJoCo")
 """Families of gymnasium-robotics that raise AssertionError with mujoco newer than 3.8."""
+REGISTERED_BY = {"dm_control": "shimmy"}
+"""Packages that register the ids of another name."""
 ROBOTICS = ("PointMaze", "AntMaze", "Adroit", *KNOWN_TO_FAIL)
 
 
@@ -111,7 +114,7 @@ def _gymnasium_make(spec: EnvSpec, **options: Any) -> gymnasium.Env[Any, Any]:
         raise MissingDependency(f"mujoco cannot be imported with MUJOCO_GL={os.environ['MUJOCO_GL']}: install what it "
                                 f"names, set MUJOCO_GL=egl, or unset it") from error
     except AssertionError as error:
-        if not spec.id.startswith(KNOWN_TO_FAIL):
+        if not spec.id.rpartition(":")[2].startswith(KNOWN_TO_FAIL):
             raise
         raise MissingDependency(f"{spec.id} does not run with the installed mujoco: pip install 'mujoco<=3.8' (the "
                                 f"mazes and Adroit run with newer ones)") from error
@@ -163,9 +166,20 @@ def _find(env_id: str) -> registration.EnvSpec:
         remedy = ": pip install 'pbcs-ompl[robotics]'" if error.name == "gymnasium_robotics" else ""
         raise MissingDependency(f"environment {env_id!r}: there is no module {error.name!r}{remedy}") from error
     except gymnasium.error.Error as error:
-        raise UnknownName("environment", env_id, _choices(name)) from error
+        raise UnknownName("environment", env_id, _choices(module, name), _of_a_module(env_id)) from error
     except (Exception, SystemExit) as error:
         raise InvalidOption(f"environment {env_id!r}: cannot import {module!r}: {describe(error)}") from error
+
+
+def _of_a_module(env_id: str) -> str:
+    """Return how to name an environment that a package registers when it is imported."""
+    if ":" in env_id or env_id.startswith("pbcs/"):
+        return ""
+    space = env_id.partition("/")[0]
+    space = REGISTERED_BY.get(space, space)
+    there = space != env_id and space.isidentifier() and find_spec(space) is not None
+    return (f" (an environment that a package registers when it is imported is named with it: "
+            f"{space if there else 'my_package'}:{env_id})")
 
 
 def _register_robotics() -> None:
@@ -174,11 +188,12 @@ def _register_robotics() -> None:
         import_module("gymnasium_robotics")
 
 
-def _choices(env_id: str) -> list[str]:
-    """Return all ids if one is close to `env_id`, else those of plug-ins only: the list would be long."""
+def _choices(module: str, env_id: str) -> list[str]:
+    """Return the ids of a module, where one is named; else all if one is close, else those of plug-ins only."""
     ids = list(gymnasium.registry)
+    own = [known for known in ids if module and str(gymnasium.registry[known].entry_point).startswith(module)]
     close = "did you mean" in did_you_mean(env_id, ids)
-    return ids if close else [known for known in ids if known.startswith("pbcs/")]
+    return own or (ids if close else [known for known in ids if known.startswith("pbcs/")])
 
 
 def _check_options(spec: registration.EnvSpec, kwargs: dict[str, Any]) -> None:

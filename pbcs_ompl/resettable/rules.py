@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, did_you_mean
+from pbcs_ompl.core.interfaces import GetSetEnv
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.observations import flat
@@ -171,10 +172,15 @@ def _simulated(env: Any) -> Any:
     return data
 
 
-def _attribute(env: Any, name: str) -> Any:
-    if not hasattr(env, name):
-        raise InvalidOption(f"{type(env).__name__} has no attribute {name!r}")
-    return getattr(env, name)
+def _state(env: Any) -> Any:
+    """Return what the environment says is its state."""
+    if isinstance(env, GetSetEnv) and simulation_of(env) is None:
+        return env.get_env_state()
+    state = getattr(env, "state", None)
+    if state is None:
+        raise InvalidOption(f"{type(bare(env)).__name__} has neither get_env_state() nor an attribute 'state'; choose "
+                            f"from {', '.join(sorted(set(SOURCES) - {'state'}))}")
+    return state
 
 
 def _entry(outcome: Outcome, key: str) -> Any:
@@ -204,7 +210,7 @@ SOURCES: dict[str, Callable[[Outcome, tuple[str, ...]], Any]] = {
     "obs": lambda outcome, _: flat(outcome.observation),
     "qpos": lambda outcome, _: _simulated(outcome.env).qpos,
     "qvel": lambda outcome, _: _simulated(outcome.env).qvel,
-    "state": lambda outcome, _: _attribute(outcome.env, "state"),
+    "state": lambda outcome, _: _state(outcome.env),
     "achieved_goal": lambda outcome, _: _entry(outcome, "achieved_goal"),
     "desired_goal": lambda outcome, _: _entry(outcome, "desired_goal"),
     "reward": lambda outcome, _: [outcome.reward],

@@ -14,7 +14,7 @@ from pbcs_ompl.core.errors import DamagedFile, InvalidOption, UnknownName
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.options import check_names, check_range, check_types
 from pbcs_ompl.core.plain import plain
-from pbcs_ompl.core.trust import is_module_name, module_names, refuse_modules
+from pbcs_ompl.core.trust import config_modules, refuse_modules
 from pbcs_ompl.results import schema
 from pbcs_ompl.results.files import read_toml
 from pbcs_ompl.results.schema import check
@@ -198,13 +198,6 @@ class TrainConfig:
         """Return a function that builds an agent for `model` from a seed."""
         kind, spaces = load_agent(self.agent), self.settings.agent_spaces(model)
         return lambda seed: kind(*spaces, settings=self.agent_settings, seeds=(seed,), device=self.device)
-
-
-def config_modules(values: Mapping[str, Any]) -> list[str]:
-    """Return the names in a config.toml, but for its environment, that import a module."""
-    direct = [values.get("planner"), values.get("agent")]
-    named = [name for name in direct if isinstance(name, str) and is_module_name(name)]
-    return [*named, *module_names([values.get(key) for key in ("planner_kwargs", "agent_settings", "settings")])]
 
 
 def read_config(path: Path, *, trust: bool = False) -> tuple[EnvSpec, TrainConfig, dict[str, str]]:

@@ -1,6 +1,7 @@
 """Planners, agents and settings are listed with defaults and meanings; without torch, what is missing is named."""
 
 import json
+import shlex
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -11,7 +12,7 @@ import pytest
 from pbcs_ompl.cli import main
 
 WITHOUT_TORCH = """
-import sys
+import contextlib, io, json, sys
 from importlib.machinery import PathFinder
 
 found = PathFinder.find_spec
@@ -21,8 +22,14 @@ def find_spec(name, path=None, target=None):
 
 PathFinder.find_spec = find_spec
 from pbcs_ompl.cli import main
-sys.exit(main(sys.argv[1:]))
+ends = []
+for words in json.loads(sys.argv[1]):
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        status = main(words)
+    ends.append([status, out.getvalue() + err.getvalue()])
+print(json.dumps(ends))
 """
+COMMAND = 'pip install "pbcs-ompl[rl]"'
 
 
 def listed(words: list[str], capsys: pytest.CaptureFixture[str]) -> dict:
@@ -48,25 +55,24 @@ def test_one_of_them_is_shown_in_words(capsys: pytest.CaptureFixture[str]) -> No
     assert "'fast'" in capsys.readouterr().err
 
 
-def without_torch(words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", WITHOUT_TORCH, *words], cwd=folder, capture_output=True, text=True)
+def without_torch(lines: list[str], folder: Path) -> list[tuple[int, str]]:
+    """Return status and output of commands, one after the other in a process that cannot import torch."""
+    run = subprocess.run([sys.executable, "-c", WITHOUT_TORCH, json.dumps([shlex.split(line) for line in lines])],
+                         cwd=folder, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    return [tuple(end) for end in json.loads(run.stdout.splitlines()[-1])]
 
 
 def test_without_torch_there_are_plans_and_the_rest_is_named(tmp_path: Path) -> None:
-    doctor = without_torch(["doctor"], tmp_path)
-    assert 'pip install "pbcs-ompl[rl]"' in doctor.stdout
-    demo = without_torch(["demo", "--out", "demo"], tmp_path)
-    assert demo.returncode == 0, demo.stderr
-    assert 'pip install "pbcs-ompl[rl]"' in demo.stderr
+    works = ["demo --out demo", "compare --planners Ex --env pbcs/Maze-v0 --env-kwargs '{\"size\": 2}' --seeds 1",
+             "report .", "study ex-settings --emit make --out study", "view demo"]
+    refused = ["settings", "train --env pbcs/Maze-v0", "study deadlock", "export demo --to onnx"]
+    *ends, doctor, agents = without_torch([*works, *refused, "doctor", "agents"], tmp_path)
+    for line, (status, text) in zip(works, ends, strict=False):
+        assert status == (3 if line == "view demo" and find_spec("viser") is None else 0), f"{line}: {text}"
+    for line, (status, text) in zip(refused, ends[len(works):], strict=True):
+        assert (status, COMMAND in text, "Traceback" in text) == (3, True, False), f"{line}: {text}"
     assert (tmp_path / "demo/tree.png").is_file()
-    viewed = without_torch(["view", "demo"], tmp_path)
-    assert viewed.returncode == (0 if find_spec("viser") else 3), viewed.stderr
-    compared = without_torch(["compare", "--planners", "Ex", "--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 2}',
-                              "--seeds", "1"], tmp_path)
-    assert compared.returncode == 0, compared.stderr
-    for words in (["agents"], ["settings"], ["train", "--env", "pbcs/Maze-v0"],
-                  ["export", "demo", "--to", "onnx"]):
-        run = without_torch(words, tmp_path)
-        assert (run.returncode == 3) == (words != ["agents"]), f"{words}: {run.stderr}"
-        assert 'pip install "pbcs-ompl[rl]"' in run.stdout + run.stderr, f"{words}: {run.stderr}"
-        assert "Traceback" not in run.stderr
+    assert COMMAND in ends[0][1]
+    assert COMMAND in doctor[1]
+    assert COMMAND in agents[1]

@@ -155,9 +155,64 @@ def test_the_observation_serves_as_state_and_gives_the_bounds() -> None:
     np.testing.assert_array_equal(model.observe(np.array([[1.0, 2.0, 0.0]])), [[1.0, 2.0]])
 
 
+class Seen(Cart):
+    """Two methods and nothing else; what is observed is no function of the state that a user could write in a line."""
+
+    observe = state_low = state_high = feature_dims = property()  # type: ignore[assignment]
+
+    def reset(self, **kwargs: Any) -> Any:
+        super().reset(**kwargs)
+        return np.array([-1.0]), {}
+
+    def step(self, action: Any) -> Any:
+        _, *rest = super().step(action)
+        return np.array([self.state[0] * action[0]]), *rest
+
+
+def test_two_methods_are_enough() -> None:
+    report = check_resettable(Seen())
+    assert report.ok, str(report)
+    model = adapt(Seen())
+    assert model.capabilities == {"visited", "exact"}
+    start = model.initial_state(0)
+    first = model.transition(start[None], np.array([[1.0]])).states
+    second = model.transition(first, np.array([[0.5]])).states
+    np.testing.assert_allclose(model.observe(np.concatenate([start[None], first, second])), [[-1.0], [0.01], [0.0125]])
+
+
+def test_rules_read_the_state_of_an_environment_that_offers_it() -> None:
+    model = adapt(Seen(), feature="state[0]", goal="state[1]>0.15")
+    after = model.transition(model.initial_state(0)[None], np.array([[1.0]]))
+    assert not after.success[0]
+    after = model.transition(after.states, np.array([[1.0]]))
+    assert after.success[0]
+    np.testing.assert_allclose(model.feature(after.states), [[0.03]])
+
+
+def test_what_an_environment_declares_bounds_its_state_as_a_feature() -> None:
+    model = adapt(Cart(), feature="state[1]")
+    np.testing.assert_array_equal((model.feature_low, model.feature_high), [[-1.0], [1.0]])
+    assert adapt(Cart(), goal="obs>1").feature_high.tolist() == [5.0]
+
+
+def test_a_feature_does_not_change_what_a_success_is() -> None:
+    class WithGoal(Cart):
+        goal_threshold = 0.25
+
+        def step(self, action: Any) -> Any:
+            observation, reward, _, _, _ = super().step(action)
+            return observation, reward, False, False, {}
+
+        def goal_distance(self, states: np.ndarray) -> np.ndarray:
+            return np.abs(states[:, 0] - 0.255)
+
+    after = [adapt(WithGoal(), feature=feature).transition(adapt(WithGoal(), feature=feature).initial_state(0)[None],
+                                                           np.array([[1.0]])).success[0] for feature in (None, "obs")]
+    assert after == [True, True]
+
+
 @pytest.mark.parametrize(("members", "complaint"), [
     ({"get_env_state": lambda self: {"qpos": self.state}}, "returned a dict; expected a vector"),
-    ({"observe": None}, "observe"),
     ({"state_low": np.array([-np.inf, 0.0])}, "finite vectors"),
     ({"state_low": np.zeros(3), "state_high": np.ones(3)}, "state_low has 3 dimensions"),
     ({"feature_dims": (5,)}, "feature_dims"),

@@ -8,8 +8,9 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.without_goal import without_goal
 from pbcs_ompl.skills import method_settings, train
-from pbcs_ompl.skills.exploration import explore, without_goal
+from pbcs_ompl.skills.exploration import explore
 from pbcs_ompl.skills.single_policy import PB, Bootstrapped, Offline, Plain
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints

@@ -8,10 +8,13 @@ import numpy as np
 from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
+from pbcs_ompl.resettable.adapters.success_flag import as_vector
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes, plain_copies
 from pbcs_ompl.resettable.memory.memory import Memory
-from pbcs_ompl.resettable.rules import FeatureRule, feature_rule
+from pbcs_ompl.resettable.observations import has_goals
+from pbcs_ompl.resettable.observing import state_observer
+from pbcs_ompl.resettable.rules import FeatureRule, Outcome, feature_rule, granted_success, selected_dims
 from pbcs_ompl.resettable.task_env import bare
 
 ANGLES = {"PendulumEnv": (0,), "AcrobotEnv": (0, 1)}
@@ -94,28 +97,92 @@ def has_state_attribute(env: Any) -> bool:
 
 
 class VectorEnv(RestorableEnv):
-    """An environment with `get_env_state`, `set_env_state` and `observe`, to which a goal or feature is given."""
+    """An environment with `get_env_state` and `set_env_state` of which something is given, or not known.
+
+    A goal or feature is given to it, or it declares no bounds, or nothing says what is observed in a state: the last
+    observation is then kept as a part of the state.
+    """
+
+    def __init__(self, inner: Any, goal: Any = None, feature: Any = None):
+        self._offers = EnvAttributes.of(inner)
+        self._observe = state_observer(inner, self._offers)
+        inner.reset(seed=0)
+        self._size = len(as_vector(inner, inner.get_env_state()))
+        self._observed: Array = np.empty(0)
+        if feature is None:  # what the environment declares fits its own choice
+            self.walls, self.goal_circle, self.bin_size = (self._offers.walls, self._offers.goal_circle,
+                                                           self._offers.bin_size)
+        self.max_episode_steps = self._offers.max_episode_steps
+        super().__init__(inner, goal, feature)
 
     def default_feature(self) -> FeatureRule:
-        """Return what the environment itself calls its feature, else all of its state."""
-        offered = EnvAttributes.of(self.inner).feature_dims
-        dims = list(range(len(self.inner.get_env_state())) if offered is None else offered)
+        """Return what the environment itself calls its feature, else its achieved goal, else all of its state."""
+        dims = self._declared_dims
+        if self._offers.feature_dims is None and has_goals(self.inner):
+            return feature_rule("achieved_goal")
         return lambda outcome: np.asarray(outcome.env.get_env_state())[dims]
 
+    def feature_box(self) -> tuple[Array, Array] | None:
+        """Return the bounds [F] that the environment declares of the numbers of its state that are the feature."""
+        low, high, dims = self._offers.state_low, self._offers.state_high, self._dims
+        if low is None or high is None or dims is None:
+            return None
+        return np.asarray(low, np.float64)[dims], np.asarray(high, np.float64)[dims]
+
+    def _periods(self) -> Array:
+        declared, dims = self._offers.feature_periods, self._dims
+        periods = {} if declared is None else dict(zip(self._declared_dims, declared, strict=False))
+        return np.array([periods.get(dim, 0.0) for dim in dims or [-1] * len(self._head)])
+
+    @property
+    def _dims(self) -> list[int] | None:
+        """Which numbers of the environment's state are the feature; None if it is something else."""
+        if self.feature_rule is None:
+            return None if self._offers.feature_dims is None and has_goals(self.inner) else self._declared_dims
+        chosen = selected_dims(self.feature_rule, "state", self._size)
+        return None if chosen is None else list(chosen)
+
+    @property
+    def _declared_dims(self) -> list[int]:
+        offered = self._offers.feature_dims
+        return list(range(self._size)) if offered is None else [int(dim) for dim in offered]
+
+    def is_success(self, outcome: Outcome) -> bool:
+        """Return whether an outcome is a success: by the goal that was given, else as the environment grants it."""
+        return granted_success(outcome) if self.goal_rule is None else super().is_success(outcome)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        """Reset the environment, and keep what is observed."""
+        outcome = super().reset(seed=seed, options=options)
+        self._observed = outcome[0]
+        return outcome
+
+    def step(self, action: Array) -> Any:
+        """Make one step, and keep what is observed."""
+        outcome = super().step(action)
+        self._observed = outcome[0]
+        return outcome
+
     def save(self) -> Array:
-        """Return the environment's own state."""
-        return np.array(self.inner.get_env_state(), dtype=np.float64)
+        """Return the environment's own state, and what is observed in it where nothing else says that."""
+        state = as_vector(self.inner, self.inner.get_env_state())
+        return state if self._observe is not None else np.concatenate([state, self._observed])
 
     def load(self, saved: Array) -> None:
         """Go back to a state of the environment."""
-        self.inner.set_env_state(saved.copy())
+        self._observed = saved[self._size:].copy()
+        self.inner.set_env_state(saved[:self._size].copy())
 
     def named_state(self, env: Any) -> dict[str, Any]:
         """Return the environment's own state."""
         return {"get_env_state()": env.get_env_state()}
 
+    def observe(self, states: Array) -> Array:
+        """Return the observations [B, O] of states [B, D]."""
+        features = len(self.feature_dims)
+        saved = np.array(states, dtype=np.float64)[:, features:-1]
+        return saved[:, self._size:] if self._observe is None else self._observe(saved)
+
     def observation(self) -> Any:
-        """Return the environment's observation, its state where it has no `observe`."""
-        state = self.save()
-        observe = EnvAttributes.of(self.inner).observe
-        return state if observe is None else observe(state[None])[0]
+        """Return what was kept; `observe` makes no use of it."""
+        return self._observed

@@ -15,7 +15,7 @@ from pbcs_ompl.core.errors import CallbackFailed
 from pbcs_ompl.core.types import Array, Capability
 from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.feature_bounds import feature_bounds, narrow_words
-from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.observations import flat, has_goals
 from pbcs_ompl.resettable.rules import (
     FeatureRule,
     GoalRule,
@@ -66,12 +66,12 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         self.render_mode = inner.render_mode
         self.action_space = inner.action_space
         self._head, self._distance = np.empty(0), 1.0
-        self._has_goal_distance = False
+        self.has_goal_distance = False
         self._saves = 0
         self.named: Any = None
         observation, _ = self.reset(seed=0)
         self.observation_space = Box(-np.inf, np.inf, observation.shape, np.float64)
-        self.goal_threshold = self.goal_radius if self._has_goal_distance else 0.5
+        self.goal_threshold = self.goal_radius if self.has_goal_distance else 0.5
         saved = len(self.save())
         self.feature_dims = tuple(range(len(self._head)))
         self.feature_periods = self._periods()
@@ -117,8 +117,8 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         return self.inner.seen(observation) if isinstance(self.inner, TaskEnv) else observation
 
     def default_feature(self) -> FeatureRule:
-        """Return what planners explore unless the user says otherwise."""
-        return feature_rule("obs")
+        """Return what planners explore unless the user says otherwise: the achieved goal where there is one."""
+        return feature_rule("achieved_goal" if has_goals(self.inner) else "obs")
 
     def reported_goal_distance(self, observation: Any) -> float | None:
         """Return the distance to the goal that an observation of `inner` shows; None where it shows none."""
@@ -243,7 +243,7 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
             raise CallbackFailed("the feature function returned no numbers")
         success = self.is_success(outcome)
         reported = None if self.goal_rule is not None else self.reported_goal_distance(self.named)
-        self._has_goal_distance = reported is not None
+        self.has_goal_distance = reported is not None
         if reported is None:
             self._distance = 0.0 if success else 1.0
         else:

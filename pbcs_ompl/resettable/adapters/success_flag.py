@@ -151,24 +151,29 @@ def as_vector(env: Any, state: Any) -> Array:
     return np.array(state, dtype=np.float64)
 
 
+def knows_bounds(env: Any, offers: EnvAttributes) -> bool:
+    """Return whether an environment declares the bounds of its state, or observes all of it within finite bounds."""
+    if offers.state_low is not None and offers.state_high is not None:
+        return True
+    low, high = flat_bounds(bare(env).observation_space)
+    return bool(np.isfinite(high - low).all()) and observed_type(bare(env), reset_options(env)) is not None
+
+
 def state_bounds(env: Any, offers: EnvAttributes, state: Array) -> tuple[Array, Array]:
-    """Return the bounds of the state [N] that the environment declares, else those of its observations, if it is one.
+    """Return the bounds of the state [N] that the environment declares, else those of its observations.
 
     Args:
-        env: The environment.
+        env: An environment that `knows_bounds`.
         offers: Its optional attributes.
         state: One of its states [N].
 
     Raises:
-        NotResettable: there are none, or they have another length.
+        NotResettable: they have another length.
     """
     if offers.state_low is not None and offers.state_high is not None:
         low, high = widened(offers.state_low, -np.inf), widened(offers.state_high, np.inf)
     else:
         low, high = flat_bounds(bare(env).observation_space)
-        if not np.isfinite(high - low).all() or observed_type(bare(env), reset_options(env)) is None:
-            raise NotResettable(f"{_name(env)}: the bounds of its {len(state)} state dimensions are "
-                                f"unknown; set `state_low` and `state_high`")
     if low.shape != state.shape:
         raise NotResettable(f"{_name(env)}: state_low has {low.size} dimensions, the state has {len(state)}")
     return low, high

@@ -6,7 +6,7 @@ from typing import Any
 
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.registry import names
-from pbcs_ompl.core.trust import is_module_name
+from pbcs_ompl.core.trust import config_modules, is_module_name
 from pbcs_ompl.experiments.study import SWEEP, study_folders
 from pbcs_ompl.resettable.make import is_known
 from pbcs_ompl.results.command_line import (
@@ -25,7 +25,6 @@ from pbcs_ompl.results.command_line import (
 from pbcs_ompl.results.files import CHECKPOINT, PLAN, TRAJECTORY, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import Folder
 from pbcs_ompl.results.schema import PlanEffort
-from pbcs_ompl.skills.config import config_modules
 
 
 def repeating(folder: Folder) -> str:

@@ -8,7 +8,7 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable import make
-from pbcs_ompl.skills.exploration import without_goal
+from pbcs_ompl.resettable.without_goal import without_goal
 
 PICTURED_SEED = 0
 SAMPLES = 8
