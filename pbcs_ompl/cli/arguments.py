@@ -20,9 +20,9 @@ then train a chain of skills along the plan.
 """
 EPILOG = """\
 examples:
-  pbcs plan --env pbcs/Maze-v0 --env-kwargs '{"size": 9, "maze_seed": 1}' --planner Ex
+  pbcs plan --env pbcs/Maze-v0 --env-kwargs '{"size": 9, "maze_seed": 1}'
   pbcs train --env pbcs/Maze-v0 --env-kwargs '{"size": 5, "maze_seed": 1}' --seed 0
-  pbcs compare --planners Ex RRTNH EST KPIECE1 --env pbcs/Maze-v0 --env-kwargs '{"size": 9}' --seeds 10
+  pbcs compare --planners Rides Ex EST KPIECE1 --env pbcs/Maze-v0 --env-kwargs '{"size": 9}' --seeds 10
   pbcs report runs
 
 exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed, 4 a mistake in pbcs,
@@ -162,10 +162,9 @@ def _plan(verb: Parser) -> None:
 def _train(verb: Parser) -> None:
     """plan a trajectory, then train a chain of skills along it"""
     _add_environment(verb, required=False)
-    verb.add_argument("--method", default="pbcs", metavar="NAME",
-                      help="pbcs, follow, pb, backplay, plain, bootstrapped or offline (pbcs)")
-    _add_planner(verb)
-    verb.set_defaults(planner=None)  # Ex, or none beside --path
+    verb.add_argument("--method", metavar="NAME",
+                      help="pbcs, follow, pb, backplay, plain, bootstrapped or offline (that of the preset)")
+    _add_planner(verb, None, "that of the preset, or none beside --path")
     verb.add_argument("--agent", default="ddpg", metavar="NAME", help="registered, or module:Class (ddpg)")
     verb.add_argument("--device", default="cpu", metavar="NAME", help="where the agent learns: cpu or cuda (cpu)")
     verb.add_argument("--preset", default="fast", metavar="NAME",
@@ -305,7 +304,7 @@ def _agents(verb: Parser) -> None:
 def _settings(verb: Parser) -> None:
     """list the settings of a preset for a training method, and what they mean"""
     verb.add_argument("preset", nargs="?", default="fast", metavar="PRESET", help="fast or thesis (fast)")
-    verb.add_argument("--method", default="pbcs", metavar="NAME", help="the training method (pbcs)")
+    verb.add_argument("--method", metavar="NAME", help="the training method (that of the preset)")
 
 
 def _demo(verb: Parser) -> None:
@@ -337,10 +336,10 @@ def _add_environment(verb: Parser, *, required: bool = True, several: bool = Fal
     verb.add_argument("--feature", metavar="RULE", help="what is explored, such as 'qpos[0:2]' or 'obs[0],obs[3]'")
 
 
-def _add_planner(verb: Parser) -> None:
-    verb.add_argument("--planner", default="Ex", metavar="NAME", help="a registered one or module:Class (Ex)")
+def _add_planner(verb: Parser, default: str | None = "Rides", usual: str = "Rides") -> None:
+    verb.add_argument("--planner", default=default, metavar="NAME", help=f"a registered one or module:Class ({usual})")
     verb.add_argument("--planner-kwargs", type=json_object, default={}, metavar="JSON",
-                      help="options of the planner, such as '{\"control_duration\": 10}'")
+                      help="options of the planner, such as '{\"bin_size\": 0.2}'")
 
 
 def _add_seed(verb: Parser) -> None:
