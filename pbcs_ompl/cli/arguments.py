@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from pbcs_ompl.cli.streams import print_output
-from pbcs_ompl.cli.values import amount, choice, fraction, integer, json_object, json_objects, part, seconds
+from pbcs_ompl.cli.values import Choice, amount, fraction, integer, json_object, json_objects, part, seconds
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
@@ -13,6 +13,7 @@ EXECUTORS = ("local", "ray")
 SCHEDULERS = ("make", "slurm")
 TRACKERS = ("tensorboard", "wandb", "trackio")
 FORMATS = ("numpy", "onnx", "sb3", "minari", "maniskill", "planner-arena", "csv")
+SHELLS = ("bash", "zsh", "fish")
 DESCRIPTION = """\
 Plan with OMPL in any environment that can be reset,
 then train a chain of skills along the plan.
@@ -67,10 +68,23 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+class _Completion(argparse.Action):
+    """Print what a shell reads to complete command lines."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any,
+                 option_string: str | None = None) -> None:
+        from pbcs_ompl.cli.completion import completion
+
+        print_output(completion(parser, values))
+        parser.exit()
+
+
 def build_parser() -> Parser:
     """Return the parser of all verbs."""
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    parser.add_argument("--print-completion", action=_Completion, type=Choice("shell", SHELLS), metavar="SHELL",
+                        help=f"print what completes command lines in {', '.join(SHELLS)}, and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
     for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export, _distill, _watch,
                 _planners, _agents, _settings, _demo):
@@ -161,7 +175,7 @@ def _train(verb: Parser) -> None:
                       help="agent settings that differ from the preset, such as '{\"hidden\": [128, 128]}'")
     verb.add_argument("--path", metavar="DIR",
                       help="train along this plan, a folder of pbcs plan or a trajectory")
-    verb.add_argument("--lines", type=choice("kind of lines", ("random",)), metavar="KIND",
+    verb.add_argument("--lines", type=Choice("kind of lines", ("random",)), metavar="KIND",
                       help="random: with --method follow, train one policy for any line of a robot, on random ones")
     verb.add_argument("--worlds", type=json_objects, metavar="JSON",
                       help="of --lines: options that differ from world to world, such as '[{\"maze_seed\": 1}]' (one)")
@@ -169,7 +183,7 @@ def _train(verb: Parser) -> None:
     verb.add_argument("--max-transitions", type=integer(1), metavar="N",
                       help="stop after N environment steps (10,000,000)")
     _add_out(verb)
-    verb.add_argument("--track", type=choice("tracker", TRACKERS), metavar="NAME",
+    verb.add_argument("--track", type=Choice("tracker", TRACKERS), metavar="NAME",
                       help="also write the progress for tensorboard, wandb or trackio")
     verb.add_argument("--resume", metavar="DIR", help="continue a training that was stopped")
     _add_trust(verb, "the folder of --resume")
@@ -223,7 +237,7 @@ def _study(verb: Parser) -> None:
     _add_execution(verb)
     verb.add_argument("--shard", type=part, metavar="I/N",
                       help="make the I-th of N parts of the runs, from 1; parts may share --out at the same time")
-    verb.add_argument("--emit", type=choice("scheduler", SCHEDULERS), metavar="NAME",
+    verb.add_argument("--emit", type=Choice("scheduler", SCHEDULERS), metavar="NAME",
                       help="make nothing, write the runs for a scheduler into --out: make (a Makefile) or slurm")
     verb.add_argument("--out", metavar="DIR", help="folder for the results; a study that was stopped continues there")
 
@@ -247,7 +261,7 @@ def _view(verb: Parser) -> None:
 def _export(verb: Parser) -> None:
     """write a result folder in the format of another tool"""
     verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train, plan, distill or compare, or ant")
-    verb.add_argument("--to", required=True, type=choice("format", FORMATS), metavar="FORMAT",
+    verb.add_argument("--to", required=True, type=Choice("format", FORMATS), metavar="FORMAT",
                       help="a controller: numpy, onnx; episodes: minari, maniskill, csv; both: sb3; a comparison: "
                            "planner-arena, csv")
     verb.add_argument("--episodes", type=integer(0), default=10, metavar="N",
@@ -302,7 +316,7 @@ def _add_execution(verb: Parser) -> None:
     verb.add_argument("--jobs", type=integer(1), metavar="J",
                       help="runs side by side (1, or all processors of a cluster); more than there are cores makes the "
                            "seconds meaningless")
-    verb.add_argument("--executor", type=choice("executor", EXECUTORS), default="local", metavar="NAME",
+    verb.add_argument("--executor", type=Choice("executor", EXECUTORS), default="local", metavar="NAME",
                       help="local: processes here; ray: a Ray cluster (local)")
     verb.add_argument("--address", metavar="HOST:PORT", help="the Ray cluster (auto: the one this machine is part of)")
 
