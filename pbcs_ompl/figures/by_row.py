@@ -7,24 +7,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pbcs_ompl.core.statistics import median_interval, wilson
+from pbcs_ompl.figures.by_group import Rates, Values
 from pbcs_ompl.figures.canvas import colour, new_panels
 
-Rates = Mapping[str, Mapping[str, tuple[int, int]]]
-"""For each series the (successes, trials) of each row."""
-Values = Mapping[str, Mapping[str, Sequence[float]]]
-"""For each series the values of each row."""
 ROW_INCHES = 0.42
 
 
-def rows_figure(rates: Mapping[str, Rates], values: Mapping[str, Values], *, title: str = "",
-                log: Sequence[str] = ()) -> Figure:
+def rows_figure(rates: Mapping[str, Rates], values: Mapping[str, Values], *, title: str = "") -> Figure:
     """Draw rates with 95 % Wilson intervals, and values as dots with their medians and 95 % bootstrap intervals.
 
     Args:
-        rates: The panels of rates, by the names of their axes.
-        values: The panels of values, by the names of their axes.
+        rates: The panels of rates, by the names of their axes; rows stand for groups.
+        values: The panels of values, likewise.
         title: Above all.
-        log: The names of the panels of values whose axis is logarithmic.
     """
     rows = list(dict.fromkeys(row for panel in [*rates.values(), *values.values()] for series in panel.values()
                               for row in series))
@@ -40,7 +35,6 @@ def rows_figure(rates: Mapping[str, Rates], values: Mapping[str, Values], *, tit
         for series, columns in enumerate(panel.values()):
             _draw_values(axes, {_place(rows.index(row), series, len(panel)): column for row, column in columns.items()},
                          colour(series))
-        axes.set_xscale("log" if name in log else "linear")
         axes.set_xlabel(f"{name}\n(medians, 95 % bootstrap)")
     for index, axes in enumerate(grid):
         axes.set_yticks(range(len(rows)), rows if index == 0 else [""] * len(rows))

@@ -8,7 +8,7 @@ from pbcs_ompl.figures.by_row import rows_figure
 
 def test_rows_are_named_once_and_hold_rates_and_medians():
     figure = rows_figure({"solved": {"2x2": {"first": (1, 4), "second": (0, 0)}, "3x3": {"second": (2, 2)}}},
-                         {"cost": {"2x2": {"first": [1.0, 2.0, 9.0], "second": []}}}, log=["cost"])
+                         {"cost": {"2x2": {"first": [1.0, 2.0, 9.0], "second": []}}})
     rates, values = figure.axes
     assert [text.get_text() for text in rates.get_yticklabels()] == ["first", "second"]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["2x2 (N = 0 to 4)", "3x3 (N = 2)"]
@@ -20,4 +20,3 @@ def test_rows_are_named_once_and_hold_rates_and_medians():
     assert list(dots.get_xdata()) == [1.0, 2.0, 9.0]
     assert list(median.get_xdata()) == [2.0]
     assert tuple(values.collections[0].get_segments()[0][:, 0]) == pytest.approx(median_interval([1.0, 2.0, 9.0]))
-    assert (rates.get_xscale(), values.get_xscale()) == ("linear", "log")

@@ -100,6 +100,6 @@ def _draw(rows: dict[str, Records], title: str, path: Path) -> None:
                                   for size, one in groups.items()}},
         {"covered part of the plan": {size: {row: [r["covered"] for r in runs] for row, runs in one.items()}
                                       for size, one in groups.items()},
-         "transitions of solved runs": {size: {row: [r["transitions"] for r in runs if r["solved"]]
-                                               for row, runs in one.items()} for size, one in groups.items()}},
-        title=f"{title}; at most {budget:,} transitions", log=["transitions of solved runs"]), path)
+         "transitions of solved runs, thousands": {
+             size: {row: [r["transitions"] / 1000 for r in runs if r["solved"]] for row, runs in one.items()}
+             for size, one in groups.items()}}, title=f"{title}; at most {budget:,} transitions"), path)
