@@ -73,7 +73,7 @@ class StopAfter:
             raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
 def test_a_training_that_was_stopped_or_killed_resumes_bit_for_bit(tmp_path, number):
     """A Ctrl-C may happen anywhere within a step, which is finished first; a kill goes back to the last checkpoint."""
     whole = train("pbcs/Maze-v0", env_kwargs={"size": 3}, seed=1)
