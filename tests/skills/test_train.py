@@ -22,9 +22,9 @@ from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.files import read_toml
 from pbcs_ompl.skills import Evaluation, SkillChain, resume, train
+from pbcs_ompl.skills.criterion import failure
 from pbcs_ompl.skills.policy import policy_to_arrays
 from pbcs_ompl.skills.settings import CriterionSettings
-from pbcs_ompl.skills.training import failure
 
 MAZE = {"size": 2}
 
