@@ -246,6 +246,7 @@ class _Follower:
         self._origin, self._scale = arrays["origin"], arrays["scale"]
         self._patience = words["patience"]
         self._reach = np.arange(words["reach"] + 1)
+        self._pass_radius = arrays.get("pass_radius", np.inf)  # of older files
 
     def step(self, observations: Array, memory: Memory) -> Step:
         """Return what networks see [B, I], which one acts [B], and no side."""
@@ -260,8 +261,10 @@ class _Follower:
         """Move the pointers to the nearest points of those ahead, and count the steps since they moved last."""
         pointer, stalled = memory["pointer"], memory["stalled"]
         candidates = np.minimum(pointer[:, None] + self._reach, len(self.line) - 1)
-        nearest = ((self.line[candidates] - places[:, None]) ** 2).sum(axis=2).argmin(axis=1)
-        moved = candidates[np.arange(len(places)), nearest]
+        squares = ((self.line[candidates] - places[:, None]) ** 2).sum(axis=2)
+        barred = (squares[:, 1:] > squares[:, :-1]) & (squares[:, 1:] > self._pass_radius ** 2)
+        squares[:, 1:][np.logical_or.accumulate(barred, axis=1)] = np.inf
+        moved = candidates[np.arange(len(places)), squares.argmin(axis=1)]
         stalled[:] = np.where(moved > pointer, 0, stalled + 1)
         pointer[:] = moved
 

@@ -79,8 +79,9 @@ class FollowChain(TrainedController):
         """Write chain.json (structure), chain.npz (the line, what policies see) and chain.safetensors (policies)."""
         view = self.view
         arrays = {"start": self.start, "first_action": self.actions.first, "last_action": self.actions.last,
-                  "points": self.line.points, "entries": view.entries, "unit": view.unit,
-                  "origin": view.normaliser.origin, "scale": view.normaliser.scale, "distances": view.distances}
+                  "points": self.line.points, "pass_radius": np.array(self.line.pass_radius),
+                  "entries": view.entries, "unit": view.unit, "origin": view.normaliser.origin,
+                  "scale": view.normaliser.scale, "distances": view.distances}
         structure = {
             "environment": self.environment.to_dict(), "time_limit": self.time_limit, "reset_seed": self.reset_seed,
             "action_shape": list(self.actions.shape), "skills": [{"first": int(first)} for first in self.firsts],
@@ -109,7 +110,8 @@ class FollowChain(TrainedController):
             actions = ActionMap(arrays["first_action"], arrays["last_action"], tuple(structure["action_shape"]))
             return cls(tuple(policy.actor for policy in policies),
                        tuple(place["first"] for place in structure["skills"]),
-                       Line(arrays["points"], structure["spacing"]), view, arrays["start"],
+                       Line(arrays["points"], structure["spacing"], float(arrays.get("pass_radius", np.inf))), view,
+                       arrays["start"],
                        EnvSpec.from_dict(structure["environment"], trusted=trust), structure["time_limit"], actions,
                        structure["reset_seed"])
         except (KeyError, ValueError, TypeError, IndexError) as error:

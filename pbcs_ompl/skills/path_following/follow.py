@@ -1,8 +1,8 @@
 """Path following: one policy along the whole plan, and more only where one does not succeed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -17,15 +17,15 @@ from pbcs_ompl.skills.sequential_test import SequentialTest
 from pbcs_ompl.skills.settings import AgentSpaces, PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
 
-FIRST_TRIALS = 4
-"""Noisy executions of a test before the sequential test is asked; each time as many again follow."""
+FIRST_TRIALS, MOST_TRIALS = 4, 8
+"""Noisy executions of a test side by side before the sequential test is asked: first, and later."""
 SHORTEST_SESSION = 250
 """Transitions of a session along a short line."""
 
 
 @dataclass(frozen=True)
 class FollowSettings(PlannedSettings):
-    """Settings of the method "follow"; those of the groups `starts` and `plan` have no meaning for it.
+    """Settings of the method "follow"; those of the groups `starts` and `plan`, but `improve`, have no meaning for it.
 
     A step is worth progress_reward * (its progress, in steps) - effort_cost * (mean square of the action, in [-1, 1]),
     and `episodes.success_reward` more where it reaches the end.
@@ -46,7 +46,10 @@ class FollowSettings(PlannedSettings):
             good policy is dear).
         averaging: Fraction of the averaged policy that stays after an update of the agent; it is the average that is
             tested and kept (ours: that of the agent's target networks; with 0, the last policy, tests fail more often).
-        attempts: Tests that a policy may fail before the line is split (ours; 6 and 10 were equal in mazes).
+        attempts: Tests that a policy may fail before the line is split (ours; 6 and 10 were equal in mazes). Each time
+            that training begins again, its sessions are twice as long.
+        longest_horizon: Each time that training begins again, the agent's horizon 1 / (1 - discount) is twice as long,
+            up to this many times that of its settings (ours: with a short one, it does not learn to fly).
     """
 
     line: LineSettings = field(default_factory=LineSettings)
@@ -60,11 +63,13 @@ class FollowSettings(PlannedSettings):
     test_share: float = 0.5
     averaging: float = 0.995
     attempts: int = 6
+    longest_horizon: float = 4.0
 
     def _check_ranges(self) -> None:
         self._check_positive("progress_reward")
         self._check("at least 0", lambda value: value >= 0, "effort_cost", "action_noise", "test_share")
         self._check_fractions("start_fraction", "retry_fraction", "averaging")
+        self._check("at least 1", lambda value: value >= 1, "longest_horizon")
         self._check_counts("session_lengths", "attempts")
 
     def agent_spaces(self, model: ResettableModel) -> AgentSpaces:
@@ -100,6 +105,7 @@ class FollowState:
         best_rate, best_blocked: Those of its best test so far.
         candidate: The pointer from which the best policy is tried next, in a split.
         passed: Whether the policies lead from the start to the goal.
+        rounds: How often training has begun again.
     """
 
     end: int
@@ -110,15 +116,37 @@ class FollowState:
     best_blocked: int = 0
     candidate: int = 0
     passed: bool = False
+    rounds: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Trouble:
+    """Where executions of a refused test failed.
+
+    Attributes:
+        before: Where they were shortly before [F].
+        ends: The pointers at which they came to their ends [F].
+    """
+
+    before: Position
+    ends: IndexArray
+
+    @classmethod
+    def together(cls, troubles: Sequence["Trouble"]) -> Self:
+        """Return several as one."""
+        return cls(Position.together([one.before for one in troubles]), np.concatenate([one.ends for one in troubles]))
 
 
 class Follow:
     """Trains one policy to move along the plan, from states all along it, until it passes a sequential test.
 
     A test executes the policy from the start once without noise and, if that succeeds, with random actions until the
-    sequential test has an answer. After `attempts` failed tests the line is split: the best policy is tried from where
-    its failures ended. From the first place where it passes it is kept to the end, and a new policy is trained up to
-    there. Where it passes nowhere, training begins again with new networks.
+    sequential test has an answer. Where the last such test found failures, executions begin shortly before them and end
+    shortly after them first: a policy that still fails there is refused for a fraction of the steps.
+
+    After `attempts` failed tests the line is split: the best policy is tried from where its failures ended. From the
+    first place where it passes it is kept to the end, and a new policy is trained up to there. Where it passes nowhere,
+    training begins again with new networks, longer sessions and a longer horizon.
 
     Source: ours. Starts all along a demonstration are those of DeepMimic (Peng et al. 2018, "reference state
     initialization"); the split is the idea of [Matheron2020] chapter 7.
@@ -132,13 +160,14 @@ class Follow:
         self.members: list[Member] = []
         """Finished policies, in the order of execution."""
         self.best: Policy | None = None
-        self._train_to(self.task.line.last + 1)
+        self._train_to(self.task.line.last + 1, 0)
 
-    def _train_to(self, end: int) -> None:
+    def _train_to(self, end: int, rounds: int) -> None:
         """Train a policy from the start to the pointer `end` from now on."""
-        self.state = FollowState(end)
+        self.state = FollowState(end, rounds=rounds)
         self.best = None
         self._retries: Position | None = None
+        self._trouble: Trouble | None = None
         self._average = self._present()
         self._position = self._fresh(self.trainer.settings.episodes_per_batch)
         self._steps = np.zeros(len(self._position.states), dtype=np.int64)
@@ -174,7 +203,7 @@ class Follow:
 
     @property
     def _session_transitions(self) -> int:
-        return max(SHORTEST_SESSION, self.settings.session_lengths * self.task.hops,
+        return max(max(SHORTEST_SESSION, self.settings.session_lengths * self.task.hops) << self.state.rounds,
                    round(self.settings.test_share * self.state.tested))
 
     @property
@@ -286,38 +315,65 @@ class Follow:
             state.candidate = max(self._beyond(found.blocked), state.candidate + 1)
 
     def _begin_again(self, end: int) -> None:
-        self.trainer.restart()
-        self._train_to(end)
+        rounds = self.state.rounds + 1
+        self.trainer.restart(min(2.0 ** rounds, self.settings.longest_horizon))
+        self._train_to(end, rounds)
+
+    @property
+    def _window(self) -> int:
+        """The window, in points of the line."""
+        return max(1, round(self.settings.line.window / self.task.line.spacing))
 
     def _beyond(self, pointer: int) -> int:
         """Return the pointer one window after another."""
-        return pointer + max(1, round(self.settings.line.window / self.task.line.spacing))
+        return pointer + self._window
 
     def _try(self, policy: Policy, first: int) -> Verdict:
         """Test a policy, and the finished ones after it, from a pointer on."""
         relay = Relay([policy, *(member.policy for member in self.members)],
                       [0, *(member.first for member in self.members)])
-        place = self.task.place(first)
-        blocked = self._failures(relay, place, 1, 0.0)
-        if len(blocked):
-            return Verdict(False, 0.0, int(blocked[0]))
-        trials, passed, gate = 0, None, self.settings.gate
-        while passed is None:
-            count = min(max(trials, FIRST_TRIALS), gate.most_needed(trials - len(blocked), trials))
-            blocked = np.concatenate([blocked, self._failures(relay, place, count, self.trainer.settings.test_epsilon)])
-            trials += count
-            passed = gate.verdict(trials - len(blocked), trials)
-        return Verdict(passed, 1.0 - len(blocked) / trials, int(blocked.max(initial=0)))
+        start, goal = self.task.at(np.array([self.task.place(first)])), np.array([self.task.line.last + 1])
+        ends = self._failures(relay, start, goal, 0.0).ends
+        if len(ends):
+            return Verdict(False, 0.0, int(ends[0]))
+        if first == 0 and self._trouble is not None:
+            past, _ = self._executed(relay, self._trouble.before, self._trouble.ends + 2 * self._window)
+            if not past.passed:
+                return past._replace(rate=-1.0)
+        verdict, trouble = self._executed(relay, start, goal)
+        if first == 0 and not verdict.passed:
+            self._trouble = trouble
+        return verdict
 
-    def _failures(self, relay: Relay, place: int, count: int, epsilon: float) -> IndexArray:
-        """Return where those of `count` executions that fail come to their ends [at most count]; keep their states."""
-        tries = self.task.execute(relay, np.full(count, place), epsilon=epsilon, max_steps=self._max_steps,
+    def _executed(self, relay: Relay, starts: Position, until: IndexArray) -> tuple[Verdict, Trouble]:
+        """Return the verdict of the gate on noisy executions, and where they failed.
+
+        Args:
+            relay: The policies.
+            starts: Where executions begin, in turn [N].
+            until: The pointers at which they end; beyond the line, at the goal [N].
+        """
+        gate, failures = self.settings.gate, list[Trouble]()
+        trials, failed, passed = 0, 0, None
+        while passed is None:
+            count = min(MOST_TRIALS if trials else FIRST_TRIALS, gate.most_needed(trials - failed, trials))
+            chosen = (trials + np.arange(count)) % len(until)
+            failures.append(self._failures(relay, starts[chosen], until[chosen], self.trainer.settings.test_epsilon))
+            trials += count
+            failed += len(failures[-1].ends)
+            passed = gate.verdict(trials - failed, trials)
+        trouble = Trouble.together(failures)
+        return Verdict(passed, 1.0 - failed / trials, int(trouble.ends.max(initial=0))), trouble
+
+    def _failures(self, relay: Relay, starts: Position, until: IndexArray, epsilon: float) -> Trouble:
+        """Return where executions from some starts [N] fail; training begins there from now on."""
+        tries = self.task.execute(relay, starts, until=until, epsilon=epsilon, max_steps=self._max_steps,
                                   patience=4 * self.settings.line.patience, rng=self.trainer.rng,
                                   counter=self.trainer.counter)
         mine = np.flatnonzero(tries.retries.progress.pointers < self.state.end)
         if len(mine):
             self._retries = tries.retries[mine]
-        return tries.pointers[~tries.success]
+        return Trouble(tries.before, tries.pointers[~tries.success])
 
     def snapshot(self) -> Snapshot:
         """Return everything needed to resume bit for bit."""
@@ -330,6 +386,10 @@ class Follow:
                    "episode.stalled": progress.stalled, "episode.steps": self._steps}
         if self._retries is not None:
             arrays |= {"retry.states": self._retries.states, "retry.pointers": self._retries.progress.pointers}
+        if self._trouble is not None:
+            before = self._trouble.before
+            arrays |= {"trouble.states": before.states, "trouble.pointers": before.progress.pointers,
+                       "trouble.ends": self._trouble.ends}
         return Snapshot({"trainer": plain, "state": asdict(self.state), "policies": len(policies),
                          "firsts": [member.first for member in self.members]}, arrays)
 
@@ -341,14 +401,18 @@ class Follow:
         self.members = [Member(*pair) for pair in zip(plain["firsts"], policies, strict=False)]
         self.best = policies[-1] if len(policies) > len(self.members) else None
         self.trainer.restore(plain["trainer"], {name: array for name, array in arrays.items()
-                                                if not name.startswith(("policy", "episode.", "retry."))})
+                                                if not name.startswith(("policy", "episode.", "retry.", "trouble."))})
         self.state = FollowState(**plain["state"])
         self._position = self._at(arrays["episode.states"], arrays["episode.pointers"], arrays["episode.stalled"])
-        self._retries = None
-        if "retry.states" in arrays:
-            pointers = arrays["retry.pointers"]
-            self._retries = self._at(arrays["retry.states"], pointers, np.zeros_like(pointers))
+        self._retries = self._begun("retry", arrays) if "retry.states" in arrays else None
+        self._trouble = (Trouble(self._begun("trouble", arrays), arrays["trouble.ends"].copy())
+                         if "trouble.states" in arrays else None)
         self._steps = arrays["episode.steps"].copy()
+
+    def _begun(self, name: str, arrays: Mapping[str, np.ndarray]) -> Position:
+        """Return starts of executions from a snapshot."""
+        pointers = arrays[f"{name}.pointers"]
+        return self._at(arrays[f"{name}.states"], pointers, np.zeros_like(pointers))
 
     def _at(self, states: Array, pointers: IndexArray, stalled: IndexArray) -> Position:
         """Return executions in some states [B, D]."""
