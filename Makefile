@@ -11,7 +11,7 @@ STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test slow stress check bench docs clean
+.PHONY: help setup demo test slow stress check bench docs notebooks clean
 
 help:
 	@echo "make demo    install, train a skill chain on a 5x5 maze, show the result"
@@ -21,6 +21,7 @@ help:
 	@echo "make check   lint, types, direction of imports"
 	@echo "make bench   measure what the README's table states (takes long)"
 	@echo "make docs    the documentation as a site, in docs/_build"
+	@echo "make notebooks  the tutorials as notebooks, executed, in docs/_build/notebooks"
 	@echo "make setup   only prepare $(VENV)"
 
 setup: $(STAMP)
@@ -59,6 +60,11 @@ docs: setup
 	@$(BIN)/python -c 'import sphinx' 2>/dev/null || $(BIN)/python -m pip install --quiet $(PIP_ARGS) -c constraints.txt -e '.[docs]'
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build
 	@echo "docs/_build/index.html"
+
+notebooks: setup
+	@$(BIN)/python -c 'import jupytext, nbclient, ipykernel' 2>/dev/null || \
+		$(BIN)/python -m pip install --quiet $(PIP_ARGS) -c constraints.txt -e '.[docs]'
+	$(BIN)/python docs/notebooks.py
 
 clean:
 	rm -rf build dist docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

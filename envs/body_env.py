@@ -10,6 +10,7 @@ from gymnasium.spaces import Box
 
 from pbcs_ompl.core.batches import check_batch
 from pbcs_ompl.core.errors import InvalidOption, InvalidState
+from pbcs_ompl.core.step_kernels import address_of, step_batch
 from pbcs_ompl.core.types import Array, BoolArray, Transition
 from pbcs_ompl.envs.oriented_kernels import MARGIN
 from pbcs_ompl.envs.point_env import CompiledStep
@@ -18,6 +19,7 @@ from pbcs_ompl.envs.walls_fcl import WallsFcl
 
 ANGLE = 2
 """The place of the angle in the state, after (x, y)."""
+NO_INTEGERS = np.zeros(1, dtype=np.int64)
 
 
 class BodyEnv(gymnasium.Env[Array, Array], ABC):
@@ -25,7 +27,7 @@ class BodyEnv(gymnasium.Env[Array, Array], ABC):
 
     The state is (x, y, angle, speeds...), the angle in [-pi, pi); the observation is the state, then the cosine and the
     sine of the angle. A `goal_distance` is in tolerances, so that the threshold is 1. Controls outside of the box are
-    clipped. Nothing is random. A subclass says how bodies move (`kernel`, `step_kernel`).
+    clipped. Nothing is random. A subclass says how bodies move (`kernel`, a compiled step).
 
     Args:
         settings: What the kernels take.
@@ -47,7 +49,6 @@ class BodyEnv(gymnasium.Env[Array, Array], ABC):
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 20}  # type: ignore[misc]
     goal_threshold = 1.0
     kernel: ClassVar[Callable[..., Any]]
-    step_kernel: ClassVar[Callable[..., Any]]
 
     def __init__(self, settings: Sequence[float], *, extent: float, obstacles: Sequence[Sequence[float]],
                  speeds: Sequence[tuple[float, float]], half_edges: tuple[float, float], start: Sequence[float],
@@ -74,8 +75,8 @@ class BodyEnv(gymnasium.Env[Array, Array], ABC):
         """Return the distances [B] of states [B, D] to the goal, in tolerances."""
 
     def compiled_step(self) -> CompiledStep:
-        """Return the step as a function for compiled planners; see `point_kernels.COMPILED_STEP`."""
-        return type(self).step_kernel, self.settings, self.walls, np.zeros(1, dtype=np.int64)
+        """Return the step as a function for compiled planners; see `core.step_kernels.STEP_SIGNATURE`."""
+        return type(self).kernel, self.settings, self.walls, NO_INTEGERS
 
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, D] are within the bounds and, by FCL, touch no wall [B]."""
@@ -126,7 +127,8 @@ class BodyEnv(gymnasium.Env[Array, Array], ABC):
         controls = check_batch("controls", controls, 2, InvalidOption)
         if len(states) != len(controls):
             raise InvalidOption(f"got {len(controls)} controls for {len(states)} states")
-        return Transition(*type(self).kernel(self.settings, self.walls, states, controls))
+        address = address_of(type(self).kernel)
+        return Transition(*step_batch(address, self.settings, self.walls, NO_INTEGERS, states, controls))
 
     def get_env_state(self) -> Array:
         """Return the state [D]."""

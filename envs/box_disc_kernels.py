@@ -3,8 +3,9 @@
 import numpy as np
 
 from pbcs_ompl.core.compiled import njit
+from pbcs_ompl.core.step_kernels import STEP_SIGNATURE
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, WholeStep, displacement, outcome, whole_step
+from pbcs_ompl.envs.point_kernels import FIRST_FREE, WholeStep, displacement, outcome, whole_step
 
 Step = tuple[float, float, bool]
 
@@ -39,7 +40,7 @@ def move_in_box(settings: Array, states: Array, controls: Array) -> tuple[Array,
     return after, hits
 
 
-@njit(COMPILED_STEP)
+@njit(STEP_SIGNATURE)
 def compiled_step_in_box(settings: Array, table: Array, integers: IndexArray, states: Array, parent: int,
                          controls: Array, child: int) -> tuple[float, bool, bool]:
     """Write states[child] from states[parent] and controls[child]; return reward, terminated, success."""
@@ -102,7 +103,7 @@ def move_in_disc(settings: Array, states: Array, controls: Array) -> tuple[Array
     return after, hits
 
 
-@njit(COMPILED_STEP)
+@njit(STEP_SIGNATURE)
 def compiled_step_in_disc(settings: Array, table: Array, integers: IndexArray, states: Array, parent: int,
                           controls: Array, child: int) -> tuple[float, bool, bool]:
     """Write states[child] from states[parent] and controls[child]; return reward, terminated, success."""

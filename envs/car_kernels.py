@@ -3,9 +3,9 @@
 import numpy as np
 
 from pbcs_ompl.core.compiled import njit
-from pbcs_ompl.core.types import Array, BoolArray, IndexArray
+from pbcs_ompl.core.step_kernels import STEP_SIGNATURE
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.envs.oriented_kernels import touches, wrapped
-from pbcs_ompl.envs.point_kernels import COMPILED_STEP
 
 # Places of the settings.
 (EXTENT, GOAL_X, GOAL_Y, GOAL_HEADING, NEAR, ALIGNED, TERMINATE, HALF_LENGTH, HALF_WIDTH, AHEAD, WHEELBASE, STEERING,
@@ -30,7 +30,7 @@ def goal_distances(settings: Array, states: Array) -> Array:
     return distances
 
 
-@njit(COMPILED_STEP)
+@njit(STEP_SIGNATURE)
 def compiled_step(settings: Array, walls: Array, unused: IndexArray, states: Array, parent: int, controls: Array,
                   child: int) -> tuple[float, bool, bool]:
     """Write states[child] from states[parent] and controls[child]; return reward, terminated, success.
@@ -56,16 +56,3 @@ def compiled_step(settings: Array, walls: Array, unused: IndexArray, states: Arr
     states[child, 0], states[child, 1], states[child, 2], states[child, 3] = x, y, heading, speed
     success = goal_distance(settings, x, y, heading) < 1.0
     return 1.0 if success else 0.0, success and settings[TERMINATE] != 0.0, success
-
-
-@njit()
-def transition(settings: Array, walls: Array, states: Array, controls: Array) -> tuple[
-        Array, Array, BoolArray, BoolArray]:
-    """Return the next states [B, 4], rewards, terminated and success [B] after controls [B, 2]."""
-    count, unused = states.shape[0], np.zeros(1, dtype=np.int64)
-    rows = np.concatenate((states, states))
-    given = np.concatenate((controls, controls))
-    rewards, terminated, success = np.empty(count), np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_)
-    for k in range(count):
-        rewards[k], terminated[k], success[k] = compiled_step(settings, walls, unused, rows, k, given, count + k)
-    return rows[count:].copy(), rewards, terminated, success

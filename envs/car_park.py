@@ -46,7 +46,7 @@ class CarParkEnv(BodyEnv):
     """
 
     feature_dims = (0, 1, 2)
-    kernel, step_kernel = car_kernels.transition, car_kernels.compiled_step
+    kernel = car_kernels.compiled_step
 
     def __init__(self, *, obstacles: Sequence[Sequence[float]] = OBSTACLES, start: Sequence[float] = START,
                  goal: Sequence[float] = GOAL, terminate_on_success: bool = True, render_mode: str | None = None):

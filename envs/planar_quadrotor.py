@@ -49,7 +49,7 @@ class PlanarQuadrotorEnv(BodyEnv):
     """
 
     feature_dims = (0, 1, 3, 4)
-    kernel, step_kernel = quadrotor_kernels.transition, quadrotor_kernels.compiled_step
+    kernel = quadrotor_kernels.compiled_step
 
     def __init__(self, *, obstacles: Sequence[Sequence[float]] = OBSTACLES, start: Sequence[float] = START,
                  goal: Sequence[float] = GOAL, terminate_on_success: bool = True, render_mode: str | None = None):

@@ -23,7 +23,7 @@ BIN_SIZE = 0.15
 """Ex solves mazes of size 2 to 15 with about 5 % fewer transitions than with 0.1, 0.2 or 0.25 (260 mazes)."""
 
 CompiledStep = tuple[Any, Array, Array, IndexArray]
-"""A function with the signature `point_kernels.COMPILED_STEP`, its settings, table and integers."""
+"""A function with the signature `core.step_kernels.STEP_SIGNATURE`, its settings, table and integers."""
 
 
 class PointEnv(gymnasium.Env[Array, Array], ABC):
@@ -93,7 +93,7 @@ class PointEnv(gymnasium.Env[Array, Array], ABC):
 
     @abstractmethod
     def compiled_step(self) -> CompiledStep | None:
-        """Return the step as a function for compiled planners, or None; see `point_kernels.COMPILED_STEP`."""
+        """Return the step as a function for compiled planners, or None; see `core.step_kernels.STEP_SIGNATURE`."""
 
     @abstractmethod
     def is_valid(self, states: Array) -> BoolArray:

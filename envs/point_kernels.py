@@ -11,11 +11,6 @@ WholeStep = tuple[float, float, bool, float, bool, float]
 LIMIT, SCALE, GOAL_X, GOAL_Y, GOAL_RADIUS, PENALTY, TERMINATE, FIRST_FREE = range(8)
 
 
-COMPILED_STEP = "Tuple((f8, b1, b1))(f8[::1], f8[:, ::1], i8[::1], f8[:, ::1], i8, f8[:, ::1], i8)"
-"""The signature of a step for compiled planners: step(settings, table, integers, states, parent, controls,
-child) writes states[child] and returns reward, terminated, success."""
-
-
 @njit()
 def displacement(settings: Array, a: float) -> float:
     """Return how far a control moves the point along one axis; NaN stays NaN."""

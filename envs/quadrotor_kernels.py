@@ -3,9 +3,9 @@
 import numpy as np
 
 from pbcs_ompl.core.compiled import njit
-from pbcs_ompl.core.types import Array, BoolArray, IndexArray
+from pbcs_ompl.core.step_kernels import STEP_SIGNATURE
+from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.envs.oriented_kernels import touches, wrapped
-from pbcs_ompl.envs.point_kernels import COMPILED_STEP
 
 # Places of the settings.
 (EXTENT, GOAL_X, GOAL_Z, NEAR, TERMINATE, HALF_LENGTH, HALF_HEIGHT, GRAVITY, AUTHORITY, LEVERAGE, DAMPING, DRAG,
@@ -26,7 +26,7 @@ def _within(value: float, bound: float) -> float:
     return min(bound, max(-bound, value))
 
 
-@njit(COMPILED_STEP)
+@njit(STEP_SIGNATURE)
 def compiled_step(settings: Array, walls: Array, unused: IndexArray, states: Array, parent: int, controls: Array,
                   child: int) -> tuple[float, bool, bool]:
     """Write states[child] from states[parent] and controls[child]; return reward, terminated, success.
@@ -59,16 +59,3 @@ def compiled_step(settings: Array, walls: Array, unused: IndexArray, states: Arr
     states[child, 3], states[child, 4], states[child, 5] = vx, vz, rate
     success = np.hypot(x - settings[GOAL_X], z - settings[GOAL_Z]) / settings[NEAR] < 1.0
     return 1.0 if success else 0.0, crashed or (success and settings[TERMINATE] != 0.0), success
-
-
-@njit()
-def transition(settings: Array, walls: Array, states: Array, controls: Array) -> tuple[
-        Array, Array, BoolArray, BoolArray]:
-    """Return the next states [B, 6], rewards, terminated and success [B] after controls [B, 2]."""
-    count, unused = states.shape[0], np.zeros(1, dtype=np.int64)
-    rows = np.concatenate((states, states))
-    given = np.concatenate((controls, controls))
-    rewards, terminated, success = np.empty(count), np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_)
-    for k in range(count):
-        rewards[k], terminated[k], success[k] = compiled_step(settings, walls, unused, rows, k, given, count + k)
-    return rows[count:].copy(), rewards, terminated, success

@@ -10,18 +10,13 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numba import types
 from numba.core.dispatcher import Dispatcher
-from numba.extending import intrinsic
 
 from pbcs_ompl.core.errors import CallbackFailed
+from pbcs_ompl.core.step_kernels import INTEGERS, MATRIX, STEP_SIGNATURE, VECTOR, address_of
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Array, IndexArray
 
-_vector = types.float64[::1]
-_matrix = types.float64[:, ::1]
-_integers = types.int64[::1]
-STEP_SIGNATURE = types.Tuple((types.float64, types.boolean, types.boolean))(
-    _vector, _matrix, _integers, _matrix, types.int64, _matrix, types.int64)
-PARAMETERS_TYPE = types.Tuple((types.uintp, _vector, _matrix, _integers))
+PARAMETERS_TYPE = types.Tuple((types.uintp, VECTOR, MATRIX, INTEGERS))
 """What compiled loops take of a CompiledStep: they are compiled once and cached, whatever the environment."""
 
 
@@ -81,27 +76,5 @@ def step_of(model: Any) -> CompiledStep | None:
     if not isinstance(step, Dispatcher) or STEP_SIGNATURE.args not in step.signatures:
         raise CallbackFailed(f"compiled_step of {model.spec.id} returned {step!r}; expected a function "
                              f"compiled by @njit(signature), where the signature is {STEP_SIGNATURE}")
-    compiled = step.get_compile_result(STEP_SIGNATURE)
-    address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
     return CompiledStep(step, np.array(reals, np.float64), np.array(table, np.float64, order="C"),
-                        np.array(integers, np.int64), address)
-
-
-@intrinsic
-def call_step(typing_context: Any, address: Any, reals: Any, table: Any, integers: Any, states: Any, parent: Any,
-              controls: Any, child: Any) -> Any:
-    """Call the step at an address (see CompiledStep).
-
-    Numba's own first-class functions do the same, but take 0.2 ms to enter a loop.
-    """
-    result, arguments = STEP_SIGNATURE.return_type, STEP_SIGNATURE.args
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        convention = context.call_conv
-        pointer = builder.inttoptr(values[0], convention.get_function_type(result, arguments).as_pointer())
-        status, value = convention.call_function(builder, pointer, result, arguments, values[1:])
-        with builder.if_then(status.is_error, likely=False):
-            convention.return_status_propagate(builder, status)
-        return value
-
-    return result(types.uintp, *arguments), generate
+                        np.array(integers, np.int64), address_of(step))

@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.options import check_positive_numbers
+from pbcs_ompl.core.options import check_positive_numbers, check_range
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import IndexArray
 from pbcs_ompl.planners.context import PlanningContext
 from pbcs_ompl.planners.kernels.bin_queue import empty_queue, insert
-from pbcs_ompl.planners.kernels.sparse import draw_sparse
+from pbcs_ompl.planners.kernels.sparse import draw_sparse, draw_sparsest
 from pbcs_ompl.planners.planner import Strategy
 
+RULES = ("draw", "least")
 NODES_PER_BATCH = 100
 MOST_FEATURES = 4
 """Beyond this number of features the bins around a bin are too many to visit."""
@@ -21,7 +22,8 @@ MOST_FEATURES = 4
 class ESTAdapted(Strategy):
     """Draw nodes with probability proportional to 1 / omega(s), omega the number of nodes within d of s.
 
-    Source: [Matheron2020] 3.2.
+    Source: [Matheron2020] 3.2, whose text and Fig. 3.5 give two rules: the figure draws by 1 / omega, the text takes "a
+    node x that minimizes omega(x)" (`rule="least"`).
 
     Differs: for the ball of radius d stand the 3^F bins of edge 2 d / 3 around s's bin, a box of edge 2 d;
     with more than four features, s's bin of edge 2 d alone. And the nodes of a batch (one percent of the
@@ -30,9 +32,12 @@ class ESTAdapted(Strategy):
 
     Args:
         distance: d, one for all features or one for each; by default the bin size that the problem suggests.
+        rule: "draw" or "least": any of the nodes with the least omega, all as likely.
     """
 
-    def __init__(self, distance: float | Sequence[float] | None = None):
+    def __init__(self, distance: float | Sequence[float] | None = None, rule: str = "draw"):
+        check_range("rule", rule, rule in RULES, f"one of {', '.join(RULES)}")
+        self._rule = rule
         self._given_distance = None if distance is None else check_positive_numbers("distance", distance)
 
     def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
@@ -45,8 +50,8 @@ class ESTAdapted(Strategy):
         self._bins = empty_queue(features)
 
     def resolved(self) -> dict[str, Any]:
-        """Return d for each feature."""
-        return {"distance": self._distance.tolist()}
+        """Return d for each feature, and the rule."""
+        return {"distance": self._distance.tolist(), "rule": self._rule}
 
     def batch(self, tree: Tree) -> int:
         """Return one percent of the nodes."""
@@ -55,7 +60,7 @@ class ESTAdapted(Strategy):
     def select(self, tree: Tree, count: int) -> IndexArray:
         """Return `count` independent draws."""
         nodes = np.empty(count, np.int64)
-        draw_sparse(self._bins, self._reach, self.rng, nodes)
+        (draw_sparse if self._rule == "draw" else draw_sparsest)(self._bins, self._reach, self.rng, nodes)
         return nodes
 
     def inserted(self, tree: Tree, first: int, last: int) -> None:

@@ -7,8 +7,9 @@ All entry points share `_move`, so that one step and a batch of steps give the s
 import numpy as np
 
 from pbcs_ompl.core.compiled import njit
+from pbcs_ompl.core.step_kernels import STEP_SIGNATURE
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.envs.point_kernels import COMPILED_STEP, FIRST_FREE, WholeStep, displacement, outcome, whole_step
+from pbcs_ompl.envs.point_kernels import FIRST_FREE, WholeStep, displacement, outcome, whole_step
 from pbcs_ompl.envs.wall_grid import CELLS_PER_UNIT
 
 Point = tuple[float, float]
@@ -146,7 +147,7 @@ def move(rectangles: Array, lists: IndexArray, settings: Array,
     return after, hits
 
 
-@njit(COMPILED_STEP)
+@njit(STEP_SIGNATURE)
 def compiled_step(settings: Array, rectangles: Array, lists: IndexArray, states: Array, parent: int,
                   controls: Array, child: int) -> tuple[float, bool, bool]:
     """Write states[child] from states[parent] and controls[child]; return reward, terminated, success."""

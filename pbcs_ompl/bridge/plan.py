@@ -94,7 +94,7 @@ class PlanResult:
 
 
 @checked
-def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "Ex", *,
+def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "Rides", *,
          env_kwargs: dict[str, Any] | None = None, planner_kwargs: dict[str, Any] | None = None,
          goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
          reset_options: dict[str, Any] | None = None, max_episode_steps: int | None = None, seed: int = 0,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from pbcs_ompl.cli.streams import print_output
-from pbcs_ompl.cli.values import amount, choice, fraction, integer, json_object, json_objects, part, seconds
+from pbcs_ompl.cli.values import Choice, amount, fraction, integer, json_object, json_objects, part, seconds
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import InvalidOption, UnknownName, did_you_mean
 
@@ -13,15 +13,16 @@ EXECUTORS = ("local", "ray")
 SCHEDULERS = ("make", "slurm")
 TRACKERS = ("tensorboard", "wandb", "trackio")
 FORMATS = ("numpy", "onnx", "sb3", "minari", "maniskill", "planner-arena", "csv")
+SHELLS = ("bash", "zsh", "fish")
 DESCRIPTION = """\
 Plan with OMPL in any environment that can be reset,
 then train a chain of skills along the plan.
 """
 EPILOG = """\
 examples:
-  pbcs plan --env pbcs/Maze-v0 --env-kwargs '{"size": 9, "maze_seed": 1}' --planner Ex
+  pbcs plan --env pbcs/Maze-v0 --env-kwargs '{"size": 9, "maze_seed": 1}'
   pbcs train --env pbcs/Maze-v0 --env-kwargs '{"size": 5, "maze_seed": 1}' --seed 0
-  pbcs compare --planners Ex RRTNH EST KPIECE1 --env pbcs/Maze-v0 --env-kwargs '{"size": 9}' --seeds 10
+  pbcs compare --planners Rides Ex EST KPIECE1 --env pbcs/Maze-v0 --env-kwargs '{"size": 9}' --seeds 10
   pbcs report runs
 
 exit status: 0 done, 1 ran and did not solve, 2 wrong usage or input, 3 something is not installed, 4 a mistake in pbcs,
@@ -67,10 +68,23 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+class _Completion(argparse.Action):
+    """Print what a shell reads to complete command lines."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any,
+                 option_string: str | None = None) -> None:
+        from pbcs_ompl.cli.completion import completion
+
+        print_output(completion(parser, values))
+        parser.exit()
+
+
 def build_parser() -> Parser:
     """Return the parser of all verbs."""
     parser = Parser(prog="pbcs", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    parser.add_argument("--print-completion", action=_Completion, type=Choice("shell", SHELLS), metavar="SHELL",
+                        help=f"print what completes command lines in {', '.join(SHELLS)}, and exit")
     group = parser.add_subparsers(dest="verb", metavar="VERB", parser_class=Parser)
     for add in (_doctor, _plan, _train, _eval, _compare, _study, _report, _view, _export, _distill, _watch,
                 _planners, _agents, _settings, _demo):
@@ -148,10 +162,9 @@ def _plan(verb: Parser) -> None:
 def _train(verb: Parser) -> None:
     """plan a trajectory, then train a chain of skills along it"""
     _add_environment(verb, required=False)
-    verb.add_argument("--method", default="pbcs", metavar="NAME",
-                      help="pbcs, follow, pb, backplay, plain, bootstrapped or offline (pbcs)")
-    _add_planner(verb)
-    verb.set_defaults(planner=None)  # Ex, or none beside --path
+    verb.add_argument("--method", metavar="NAME",
+                      help="pbcs, follow, pb, backplay, plain, bootstrapped or offline (that of the preset)")
+    _add_planner(verb, None, "that of the preset, or none beside --path")
     verb.add_argument("--agent", default="ddpg", metavar="NAME", help="registered, or module:Class (ddpg)")
     verb.add_argument("--device", default="cpu", metavar="NAME", help="where the agent learns: cpu or cuda (cpu)")
     verb.add_argument("--preset", default="fast", metavar="NAME",
@@ -162,7 +175,7 @@ def _train(verb: Parser) -> None:
                       help="agent settings that differ from the preset, such as '{\"hidden\": [128, 128]}'")
     verb.add_argument("--path", metavar="DIR",
                       help="train along this plan, a folder of pbcs plan or a trajectory")
-    verb.add_argument("--lines", type=choice("kind of lines", ("random",)), metavar="KIND",
+    verb.add_argument("--lines", type=Choice("kind of lines", ("random",)), metavar="KIND",
                       help="random: with --method follow, train one policy for any line of a robot, on random ones")
     verb.add_argument("--worlds", type=json_objects, metavar="JSON",
                       help="of --lines: options that differ from world to world, such as '[{\"maze_seed\": 1}]' (one)")
@@ -170,7 +183,7 @@ def _train(verb: Parser) -> None:
     verb.add_argument("--max-transitions", type=integer(1), metavar="N",
                       help="stop after N environment steps (10,000,000)")
     _add_out(verb)
-    verb.add_argument("--track", type=choice("tracker", TRACKERS), metavar="NAME",
+    verb.add_argument("--track", type=Choice("tracker", TRACKERS), metavar="NAME",
                       help="also write the progress for tensorboard, wandb or trackio")
     verb.add_argument("--resume", metavar="DIR", help="continue a training that was stopped")
     _add_trust(verb, "the folder of --resume")
@@ -224,7 +237,7 @@ def _study(verb: Parser) -> None:
     _add_execution(verb)
     verb.add_argument("--shard", type=part, metavar="I/N",
                       help="make the I-th of N parts of the runs, from 1; parts may share --out at the same time")
-    verb.add_argument("--emit", type=choice("scheduler", SCHEDULERS), metavar="NAME",
+    verb.add_argument("--emit", type=Choice("scheduler", SCHEDULERS), metavar="NAME",
                       help="make nothing, write the runs for a scheduler into --out: make (a Makefile) or slurm")
     verb.add_argument("--out", metavar="DIR", help="folder for the results; a study that was stopped continues there")
 
@@ -248,7 +261,7 @@ def _view(verb: Parser) -> None:
 def _export(verb: Parser) -> None:
     """write a result folder in the format of another tool"""
     verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train, plan, distill or compare, or ant")
-    verb.add_argument("--to", required=True, type=choice("format", FORMATS), metavar="FORMAT",
+    verb.add_argument("--to", required=True, type=Choice("format", FORMATS), metavar="FORMAT",
                       help="a controller: numpy, onnx; episodes: minari, maniskill, csv; both: sb3; a comparison: "
                            "planner-arena, csv")
     verb.add_argument("--episodes", type=integer(0), default=10, metavar="N",
@@ -291,7 +304,7 @@ def _agents(verb: Parser) -> None:
 def _settings(verb: Parser) -> None:
     """list the settings of a preset for a training method, and what they mean"""
     verb.add_argument("preset", nargs="?", default="fast", metavar="PRESET", help="fast or thesis (fast)")
-    verb.add_argument("--method", default="pbcs", metavar="NAME", help="the training method (pbcs)")
+    verb.add_argument("--method", metavar="NAME", help="the training method (that of the preset)")
 
 
 def _demo(verb: Parser) -> None:
@@ -303,7 +316,7 @@ def _add_execution(verb: Parser) -> None:
     verb.add_argument("--jobs", type=integer(1), metavar="J",
                       help="runs side by side (1, or all processors of a cluster); more than there are cores makes the "
                            "seconds meaningless")
-    verb.add_argument("--executor", type=choice("executor", EXECUTORS), default="local", metavar="NAME",
+    verb.add_argument("--executor", type=Choice("executor", EXECUTORS), default="local", metavar="NAME",
                       help="local: processes here; ray: a Ray cluster (local)")
     verb.add_argument("--address", metavar="HOST:PORT", help="the Ray cluster (auto: the one this machine is part of)")
 
@@ -323,10 +336,10 @@ def _add_environment(verb: Parser, *, required: bool = True, several: bool = Fal
     verb.add_argument("--feature", metavar="RULE", help="what is explored, such as 'qpos[0:2]' or 'obs[0],obs[3]'")
 
 
-def _add_planner(verb: Parser) -> None:
-    verb.add_argument("--planner", default="Ex", metavar="NAME", help="a registered one or module:Class (Ex)")
+def _add_planner(verb: Parser, default: str | None = "Rides", usual: str = "Rides") -> None:
+    verb.add_argument("--planner", default=default, metavar="NAME", help=f"a registered one or module:Class ({usual})")
     verb.add_argument("--planner-kwargs", type=json_object, default={}, metavar="JSON",
-                      help="options of the planner, such as '{\"control_duration\": 10}'")
+                      help="options of the planner, such as '{\"bin_size\": 0.2}'")
 
 
 def _add_seed(verb: Parser) -> None:

@@ -58,15 +58,17 @@ def _number(text: str) -> float:
         return float("nan")
 
 
-def choice(kind: str, names: Iterable[str]) -> Callable[[str], str]:
-    """Return a reader of one of `names`; the closest is suggested for any other word."""
+class Choice:
+    """A reader of one of `names`; the closest is suggested for any other word."""
 
-    def read(text: str) -> str:
-        if text not in names:
-            raise ArgumentTypeError(f"unknown {kind} {text!r}{did_you_mean(text, names)}")
+    def __init__(self, kind: str, names: Iterable[str]):
+        self.kind, self.names = kind, tuple(names)
+
+    def __call__(self, text: str) -> str:
+        """Read one of the names."""
+        if text not in self.names:
+            raise ArgumentTypeError(f"unknown {self.kind} {text!r}{did_you_mean(text, self.names)}")
         return text
-
-    return read
 
 
 def part(text: str) -> tuple[int, int]:

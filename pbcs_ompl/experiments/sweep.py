@@ -62,7 +62,7 @@ class Sweep:
 
     def folder(self, number: int) -> str:
         """Return the name of the folder of the runs in the environment of this number; they are counted from 1."""
-        return f"{number}-{self.environments[number - 1].id.rpartition('/')[2]}"
+        return f"{number}-{self.environments[number - 1].id.rpartition('/')[2].replace(':', '.')}"
 
     def config(self) -> dict[str, Any]:
         """Return plain values, for config.toml."""

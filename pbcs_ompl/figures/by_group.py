@@ -9,38 +9,53 @@ from matplotlib.figure import Figure
 from pbcs_ompl.core.statistics import median_interval, wilson
 from pbcs_ompl.figures.canvas import colour, new_figure
 
+Rates = Mapping[str, Mapping[str, tuple[int, int]]]
+"""For each series the (successes, trials) of each group."""
+Values = Mapping[str, Mapping[str, Sequence[float]]]
+"""For each series the values of each group."""
 
-def rates_figure(rates: Mapping[str, Mapping[str, tuple[int, int]]], *, title: str = "", xlabel: str = "",
-                 ylabel: str = "share of solved runs") -> Figure:
-    """Draw rates with 95 % Wilson intervals.
 
-    Args:
-        rates: For each series the (successes, trials) of each group.
-    """
+def rates_figure(rates: Rates, *, title: str = "", xlabel: str = "", ylabel: str = "share of solved runs") -> Figure:
+    """Draw rates with 95 % Wilson intervals; see `draw_rates`."""
     figure, axes = new_figure(7.2, 4.6)
+    draw_rates(axes, rates, ylabel=ylabel)
+    _finish(figure, axes, title, xlabel)
+    return figure
+
+
+def values_figure(values: Values, *, title: str = "", xlabel: str = "", ylabel: str = "", log: bool = False) -> Figure:
+    """Draw values with their medians; see `draw_values`."""
+    figure, axes = new_figure(7.2, 4.6)
+    draw_values(axes, values, ylabel=ylabel, log=log)
+    _finish(figure, axes, title, xlabel)
+    return figure
+
+
+def draw_rates(axes: Axes, rates: Rates, *, ylabel: str = "share of solved runs") -> None:
+    """Draw rates with 95 % Wilson intervals into axes."""
     places = _places(axes, rates)
-    for name, groups in rates.items():
+    for index, (name, groups) in enumerate(rates.items()):
         counts = [(at, *groups[group]) for group, at in places[name].items() if groups[group][1]]
         if not counts:
             continue
         shares = np.array([successes / trials for _, successes, trials in counts])
         bounds = np.array([wilson(successes, trials) for _, successes, trials in counts]).T
         axes.errorbar([at for at, _, _ in counts], shares, np.abs(bounds - shares), fmt="o", capsize=3, linewidth=1.4,
-                      label=f"{name} (N = {_range([trials for _, _, trials in counts])})")
+                      color=colour(index), label=f"{name} (N = {_range([trials for _, _, trials in counts])})")
     axes.set_ylim(-0.04, 1.04)
-    _finish(figure, axes, title, xlabel, f"{ylabel} (95 % Wilson)")
-    return figure
+    axes.set_ylabel(f"{ylabel} (95 % Wilson)")
+    axes.grid(alpha=0.3, axis="y")
 
 
-def values_figure(values: Mapping[str, Mapping[str, Sequence[float]]], *, title: str = "", xlabel: str = "",
-                  ylabel: str = "", log: bool = False) -> Figure:
-    """Draw the value of each run as a dot, and medians as bars with their 95 % bootstrap intervals.
+def draw_values(axes: Axes, values: Values, *, ylabel: str = "", log: bool = False) -> None:
+    """Draw the value of each run as a dot, and medians as bars with their 95 % bootstrap intervals, into axes.
 
     Args:
-        values: For each series the values of each group.
+        axes: Where.
+        values: The values.
+        ylabel: What they are.
         log: Whether the values' axis is logarithmic.
     """
-    figure, axes = new_figure(7.2, 4.6)
     places = _places(axes, values)
     for index, (name, groups) in enumerate(values.items()):
         filled = {at: groups[group] for group, at in places[name].items() if len(groups[group])}
@@ -55,8 +70,8 @@ def values_figure(values: Mapping[str, Mapping[str, Sequence[float]]], *, title:
                   label=f"{name} (N = {_range([len(column) for column in filled.values()])})")
     if log:
         axes.set_yscale("log")
-    _finish(figure, axes, title, xlabel, f"{ylabel} (bars: medians, 95 % bootstrap)")
-    return figure
+    axes.set_ylabel(f"{ylabel}\n(bars: medians, 95 % bootstrap)")
+    axes.grid(alpha=0.3, axis="y")
 
 
 def _places(axes: Axes, series: Mapping[str, Mapping[str, object]]) -> dict[str, dict[str, float]]:
@@ -74,10 +89,8 @@ def _range(counts: Sequence[int]) -> str:
     return str(low) if low == high else f"{low} to {high}"
 
 
-def _finish(figure: Figure, axes: Axes, title: str, xlabel: str, ylabel: str) -> None:
+def _finish(figure: Figure, axes: Axes, title: str, xlabel: str) -> None:
     axes.set_title(title, fontsize=10)
     axes.set_xlabel(xlabel)
-    axes.set_ylabel(ylabel)
-    axes.grid(alpha=0.3, axis="y")
     if axes.get_legend_handles_labels()[0]:
         figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)

@@ -1,36 +1,50 @@
 """Curves over training and slices of critics: what the diagnostics look like."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.figures.canvas import BAND, QUANTITIES, RED, new_figure, new_panels
+from pbcs_ompl.figures.canvas import BAND, QUANTITIES, RED, colour, new_panels
+
+HALF = 0.5
+"""Where all rates but the first are above this one, the scale begins here."""
+ENLARGED, SMALLEST_SPAN = 0.02, 1e-3
+"""An enlarged slice shows this share of the range of Q on each side of the actor's values, or the second number."""
 
 
-def success_figure(curves: Mapping[str, tuple[IndexArray, BoolArray]], *, title: str = "",
-                   xlabel: str = "steps of each seed") -> Figure:
-    """Draw the share of solved seeds over the steps, with 95 % Wilson intervals ([Matheron2020] Fig. 6.2).
+Curves = Mapping[str, tuple[IndexArray, BoolArray]]
+"""For each variant the steps [E] and which seeds were solved then [E, S]."""
+
+
+def success_figure(panels: Mapping[str, Curves], *, title: str = "", xlabel: str = "steps of each seed") -> Figure:
+    """Draw the share of solved seeds over the steps, with 95 % Wilson intervals ([Matheron2020] Figs. 6.2 and 6.10).
 
     Args:
-        curves: For each variant the steps [E] and which seeds were solved then [E, S].
+        panels: The curves of each panel, by its title. A variant has one colour in all panels.
+        title: Above all.
+        xlabel: What the steps are.
     """
-    figure, axes = new_figure(7.2, 4.6)
-    for name, (steps, success) in curves.items():
-        seeds = success.shape[1]
-        low, high = np.transpose([wilson(int(count), seeds) for count in success.sum(axis=1)])
-        (line,) = axes.plot(steps, success.mean(axis=1), linewidth=2, label=f"{name} (N = {seeds})")
-        axes.fill_between(steps, low, high, color=line.get_color(), alpha=BAND, linewidth=0)
-    axes.set_ylim(-0.02, 1.02)
-    axes.set_xlabel(xlabel)
-    axes.set_ylabel("share of solved seeds (95 % Wilson)")
-    axes.set_title(title, fontsize=10)
-    axes.grid(alpha=0.3)
-    if curves:
-        figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
+    names = list(dict.fromkeys(name for curves in panels.values() for name in curves))
+    later = [wilson(int(count), success.shape[1])[0] for curves in panels.values() for _, success in curves.values()
+             for count in success.sum(axis=1)[1:]]
+    figure, grid = new_panels(1, len(panels), max(7.2, 5.2 * len(panels)), 4.4)
+    for axes, (words, curves) in zip(grid, panels.items(), strict=True):
+        for name, (steps, success) in curves.items():
+            seeds, shade = success.shape[1], colour(names.index(name))
+            low, high = np.transpose([wilson(int(count), seeds) for count in success.sum(axis=1)])
+            axes.plot(steps, success.mean(axis=1), color=shade, linewidth=2, label=f"{name} (N = {seeds})")
+            axes.fill_between(steps, low, high, color=shade, alpha=BAND, linewidth=0)
+        axes.set_ylim(HALF if later and min(later) > HALF else -0.02, 1.02)
+        axes.set_xlabel(xlabel)
+        axes.set_title(words, fontsize=10)
+        axes.grid(alpha=0.3)
+        if curves:
+            axes.legend(loc="lower right", frameon=True, framealpha=0.85, edgecolor="none", fontsize=9)
+    grid[0].set_ylabel("share of solved seeds (95 % Wilson)")
+    figure.suptitle(title, fontsize=10)
     return figure
 
 
@@ -46,48 +60,39 @@ def curves_figure(steps: Array, panels: Mapping[str, Array], *, title: str = "",
     return figure
 
 
-def slices_figure(actions: Array, slices: Mapping[str, Array], chosen: Mapping[str, float], *, title: str = "",
-                  ylim: tuple[float, float] | None = None) -> Figure:
-    """Draw Q along one dimension of the action, and where the actor is ([Matheron2020] Figs. 6.5b and 6.9b).
+def stuck_critic_figure(states: Array, actions: Array, values: Array, chosen: Array, *, sliced: Sequence[float],
+                        title: str = "") -> Figure:
+    """Draw Q over a line of states and one dimension of the action, and slices of it, whole and enlarged.
 
-    Args:
-        actions: The actions [N].
-        slices: Q in some states [N], by what to call them.
-        chosen: The actor's action in the same states.
-        ylim: The range of Q to show; all of it by default.
-    """
-    figure, axes = new_figure(6.4, 4.6)
-    for name, values in slices.items():
-        (line,) = axes.plot(actions, values, linewidth=2, label=name)
-        axes.plot(chosen[name], np.interp(chosen[name], actions, values), marker="o", color=line.get_color())
-    axes.set_xlabel("action (the dots: the actor's)")
-    axes.set_ylabel("Q")
-    if ylim is not None:
-        axes.set_ylim(*ylim)
-    _finish(axes, title)
-    return figure
-
-
-def critic_map_figure(states: Array, actions: Array, values: Array, chosen: Array, *, title: str = "") -> Figure:
-    """Draw Q over a line of states and one dimension of the action, and the actor's way ([Matheron2020] Fig. 6.5a).
+    These are [Matheron2020] Figs. 6.5(a), 6.5(b) and 6.9(b).
 
     Args:
         states, actions: [N] and [M].
         values: Q [N, M].
         chosen: The actor's actions [N].
+        sliced: The states whose slices are drawn: the nearest ones.
+        title: Above all.
     """
-    figure, axes = new_figure(6.4, 4.6)
-    mesh = axes.pcolormesh(states, actions, values.T, shading="nearest", cmap=QUANTITIES)
-    figure.colorbar(mesh, ax=axes, label="Q")
-    axes.plot(states, chosen, color=RED, linewidth=2, label="actor")
-    axes.set_xlabel("state")
-    axes.set_ylabel("action")
-    axes.set_title(title, fontsize=10)
-    axes.legend(frameon=False, fontsize=9, labelcolor="white")
+    figure, (whole, slices, enlarged) = new_panels(1, 3, 14.4, 4.2)
+    mesh = whole.pcolormesh(states, actions, values.T, shading="nearest", cmap=QUANTITIES)
+    figure.colorbar(mesh, ax=whole, label="Q")
+    whole.plot(states, chosen, color=RED, linewidth=2, label="actor")
+    whole.set(xlabel="state", ylabel="action")
+    whole.set_title("(a) Q(s, a)", fontsize=10)
+    whole.legend(frameon=False, fontsize=9, labelcolor="white")
+    rows = [int(np.abs(states - state).argmin()) for state in sliced]
+    for axes in (slices, enlarged):
+        for row in rows:
+            (line,) = axes.plot(actions, values[row], linewidth=2, label=f"s = {states[row]:g}")
+            axes.plot(chosen[row], np.interp(chosen[row], actions, values[row]), marker="o", color=line.get_color())
+        axes.set(xlabel="action (dots: the actor's)", ylabel="Q")
+        axes.locator_params(axis="x", nbins=5)
+        axes.grid(alpha=0.3)
+    slices.set_title("(b) Q(s, ·)", fontsize=10)
+    slices.legend(frameon=False, fontsize=9)
+    ends = [float(np.interp(chosen[row], actions, values[row])) for row in rows]
+    span = max(SMALLEST_SPAN, ENLARGED * float(np.ptp(values)))
+    enlarged.set_ylim(min(ends) - span, max(ends) + span)
+    enlarged.set_title("(c) enlarged around the actor", fontsize=10)
+    figure.suptitle(title, fontsize=10)
     return figure
-
-
-def _finish(axes: Axes, title: str) -> None:
-    axes.set_title(title, fontsize=10)
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False, fontsize=9)

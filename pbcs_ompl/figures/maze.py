@@ -32,7 +32,7 @@ def draw_map(axes: Axes, model: ResettableModel) -> None:
     """Draw the model's walls and goal into axes, at equal scale.
 
     Raises:
-        Mismatch: as `stage`.
+        Mismatch: the feature has fewer than two dimensions.
     """
     if len(model.feature_low) < 2:
         raise Mismatch(f"a picture needs two feature dimensions, {model.spec.id} has {len(model.feature_low)}")
@@ -57,10 +57,10 @@ def draw_line(axes: Axes, points: Array, **style: Any) -> None:
               zorder=line.get_zorder() + 1)
 
 
-def legend_below(axes: Axes) -> None:
+def legend_below(axes: Axes, *, columns: int = 4) -> None:
     """Put the legend under the picture, where it hides nothing."""
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=4, frameon=False, fontsize=9)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=columns, frameon=False, fontsize=9)
 
 
 def _frame(axes: Axes, model: ResettableModel) -> None:

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -21,23 +22,32 @@ def tree_figure(model: ResettableModel, states: Array, parents: NDArray[np.integ
 
     A tree of more than 100 000 nodes is thinned evenly; the title says so.
     """
+    figure, axes = map_axes(model, title)
+    lines, thinned = draw_tree(axes, model, states, parents, path=path)
+    axes.set_title(f"{title}\n{thinned}" if thinned else title, fontsize=10)
+    if len(lines.get_segments()):
+        figure.colorbar(lines, ax=axes, shrink=0.7, pad=0.02, label="depth in the tree")
+    legend_below(axes)
+    return figure
+
+
+def draw_tree(axes: Axes, model: ResettableModel, states: Array, parents: NDArray[np.integer[Any]], *,
+              path: Array | None = None) -> tuple[LineCollection, str]:
+    """Draw a tree and a path as `tree_figure` does, into axes.
+
+    Returns:
+        The edges, for a bar of colours, and how many were drawn where it is not all of them.
+    """
     edges = np.flatnonzero(parents >= 0)
     drawn = edges[:: -(-len(edges) // MOST_EDGES)] if len(edges) > MOST_EDGES else edges
-    if len(drawn) < len(edges):
-        title = f"{title}\n({len(drawn):,} of {len(edges):,} edges drawn)"
-    figure, axes = map_axes(model, title)
     points = project_2d(model, states)
-    depths = depth(parents)[drawn]
-    lines = LineCollection(list(np.stack([points[parents[drawn]], points[drawn]], axis=1)), array=depths,
-                           cmap=QUANTITIES, linewidths=0.7, zorder=1)
+    lines = LineCollection(list(np.stack([points[parents[drawn]], points[drawn]], axis=1)),
+                           array=depth(parents)[drawn], cmap=QUANTITIES, linewidths=0.7, zorder=1)
     axes.add_collection(lines)
-    if len(drawn):
-        figure.colorbar(lines, ax=axes, shrink=0.7, pad=0.02, label="depth in the tree")
     if path is not None:
         draw_line(axes, project_2d(model, path), color=RED, linewidth=1.6, zorder=4,
                   label=f"path, {len(path) - 1} steps")
-    legend_below(axes)
-    return figure
+    return lines, f"({len(drawn):,} of {len(edges):,} edges drawn)" if len(drawn) < len(edges) else ""
 
 
 def depth(parents: NDArray[np.integer[Any]]) -> IndexArray:

@@ -28,6 +28,8 @@ from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 
 KNOWN_TO_FAIL = ("Fetch", "Hand", "FrankaKitchen", "MaMuJoCo")
 """Families of gymnasium-robotics that raise AssertionError with mujoco newer than 3.8."""
+REGISTERED_BY = {"dm_control": "shimmy"}
+"""Packages that register the ids of another name."""
 ROBOTICS = ("PointMaze", "AntMaze", "Adroit", *KNOWN_TO_FAIL)
 
 
@@ -112,7 +114,7 @@ def _gymnasium_make(spec: EnvSpec, **options: Any) -> gymnasium.Env[Any, Any]:
         raise MissingDependency(f"mujoco cannot be imported with MUJOCO_GL={os.environ['MUJOCO_GL']}: install what it "
                                 f"names, set MUJOCO_GL=egl, or unset it") from error
     except AssertionError as error:
-        if not spec.id.startswith(KNOWN_TO_FAIL):
+        if not spec.id.rpartition(":")[2].startswith(KNOWN_TO_FAIL):
             raise
         raise MissingDependency(f"{spec.id} does not run with the installed mujoco: pip install 'mujoco<=3.8' (the "
                                 f"mazes and Adroit run with newer ones)") from error
@@ -174,6 +176,7 @@ def _of_a_module(env_id: str) -> str:
     if ":" in env_id or env_id.startswith("pbcs/"):
         return ""
     space = env_id.partition("/")[0]
+    space = REGISTERED_BY.get(space, space)
     there = space != env_id and space.isidentifier() and find_spec(space) is not None
     return (f" (an environment that a package registers when it is imported is named with it: "
             f"{space if there else 'my_package'}:{env_id})")

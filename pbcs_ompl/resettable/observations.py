@@ -56,6 +56,12 @@ def rounded(vectors: Array, space: gymnasium.Space[Any]) -> Array:
     return np.concatenate(pieces, axis=1)
 
 
+def has_goals(env: Any) -> bool:
+    """Return whether observations of an environment, below all wrappers, have an achieved goal (`GoalEnv`)."""
+    space = env.unwrapped.observation_space
+    return isinstance(space, spaces.Dict) and "achieved_goal" in space.spaces
+
+
 def unflat(vector: Array, space: gymnasium.Space[Any]) -> Any:
     """Return the observation, a member of `space` but for rounding, that `flat` makes a vector of."""
     if isinstance(space, spaces.Dict | spaces.Tuple):

@@ -2,22 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.skills.activation_sets import ActivationSet, Target, from_arrays, kind_of, to_arrays
-from pbcs_ompl.skills.chain_files import read_chain, write_chain
+from pbcs_ompl.skills.chain_files import ChainContent
 from pbcs_ompl.skills.controller import ChainController
 from pbcs_ompl.skills.observed_sets import Entry, entry_from_arrays, entry_kinds, entry_to_arrays
 from pbcs_ompl.skills.policy import SkillPolicy
-from pbcs_ompl.skills.trained_controller import TrainedController, actions_of
+from pbcs_ompl.skills.trained_controller import TaskValues, TrainedController, actions_of
 from pbcs_ompl.skills.waypoints import Waypoints
-
-KIND = "skill chain"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +47,7 @@ class SkillChain(TrainedController):
         reset_seed: The seed of the reset that leads to the start; None where none is known to.
     """
 
+    kind = "skill chain"
     skills: tuple[Skill, ...]
     start: Array
     environment: EnvSpec
@@ -87,42 +83,24 @@ class SkillChain(TrainedController):
         return ChainController([skill.policy for skill in self.skills], [skill.entry for skill in self.skills],
                                self.actions)
 
-    @checked
-    def save(self, folder: str | Path) -> None:
-        """Write chain.json (structure), chain.npz (activation sets and targets) and chain.safetensors (policies)."""
-        arrays = {"start": self.start, "first_action": self.actions.first, "last_action": self.actions.last}
+    @property
+    def content(self) -> ChainContent:
+        """Activation sets, targets and entries as arrays, their kinds in the structure."""
+        arrays: dict[str, Array] = {}
         for index, skill in enumerate(self.skills):
             arrays |= to_arrays(skill.activation, f"activation{index}") | to_arrays(skill.target, f"target{index}")
             arrays |= entry_to_arrays(skill.entry, f"entry{index}")
-        structure = {
-            "environment": self.environment.to_dict(), "time_limit": self.time_limit, "reset_seed": self.reset_seed,
-            "action_shape": list(self.actions.shape),
-            "skills": [{"activation": kind_of(skill.activation), "target": kind_of(skill.target),
-                        "entry": entry_kinds(skill.entry)} for skill in self.skills]}
-        write_chain(Path(folder), KIND, structure, arrays, [skill.policy for skill in self.skills])
+        structure = {"skills": [{"activation": kind_of(skill.activation), "target": kind_of(skill.target),
+                                 "entry": entry_kinds(skill.entry)} for skill in self.skills]}
+        return ChainContent(structure, arrays, [skill.policy for skill in self.skills])
 
     @classmethod
-    @checked
-    def load(cls, folder: str | Path, *, trust: bool = False) -> "SkillChain":
-        """Read a chain that `save` wrote.
-
-        Args:
-            folder: The folder.
-            trust: Let its environment be made where that imports a module which the folder names.
-
-        Raises:
-            DamagedFile: a file is missing, truncated, or of another version.
-        """
-        folder = Path(folder)
-        structure, arrays, policies = read_chain(folder, KIND, trust=trust)
-        try:
-            skills = tuple(
-                Skill(policy, from_arrays(entry["activation"], arrays, f"activation{index}"),
-                      from_arrays(entry["target"], arrays, f"target{index}"),
-                      entry_from_arrays(entry["entry"], arrays, f"entry{index}"))
-                for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
-            actions = ActionMap(arrays["first_action"], arrays["last_action"], tuple(structure["action_shape"]))
-            return cls(skills, arrays["start"], EnvSpec.from_dict(structure["environment"], trusted=trust),
-                       structure["time_limit"], actions, structure["reset_seed"])
-        except (KeyError, ValueError, TypeError, IndexError) as error:
-            raise DamagedFile(f"{folder} holds a damaged skill chain: {error}") from error
+    def from_content(cls, content: ChainContent, task: TaskValues) -> "SkillChain":
+        """Return the chain of `content` for a task."""
+        structure, arrays, policies = content
+        skills = tuple(
+            Skill(policy, from_arrays(entry["activation"], arrays, f"activation{index}"),
+                  from_arrays(entry["target"], arrays, f"target{index}"),
+                  entry_from_arrays(entry["entry"], arrays, f"entry{index}"))
+            for index, (policy, entry) in enumerate(zip(policies, structure["skills"], strict=True)))
+        return cls(skills=skills, **task)

@@ -7,9 +7,8 @@ sets or a line; chain.safetensors the policies.
 import hashlib
 import json
 import warnings
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -68,6 +67,14 @@ KINDS: dict[str, type] = {"skill chain": ChainWords, "follower": FollowerWords}
 """What a folder may hold, by the name in its format."""
 
 
+class ChainContent(NamedTuple):
+    """What the three files hold: plain values, arrays, and the policies of the skills."""
+
+    structure: dict[str, Any]
+    arrays: dict[str, np.ndarray]
+    policies: list[SkillPolicy]
+
+
 def kind_in(folder: Path) -> str:
     """Return the kind of the chain in a folder.
 
@@ -87,30 +94,26 @@ def _format(kind: str) -> str:
     return f"pbcs_ompl {kind}"
 
 
-def write_chain(folder: Path, kind: str, structure: dict[str, Any], arrays: Mapping[str, np.ndarray],
-                policies: list[SkillPolicy]) -> None:
+def write_chain(folder: Path, kind: str, content: ChainContent) -> None:
     """Write the files of a chain; chain.json last, which makes the other two valid.
 
     Args:
         folder: The folder.
         kind: One of `KINDS`.
-        structure: Plain values, for chain.json.
-        arrays: Those of chain.npz.
-        policies: Those of the skills.
+        content: What they are to hold.
 
     Raises:
         RunFolderError: a file cannot be written.
         MissingDependency: safetensors is not installed.
     """
-    save_policies(folder / POLICIES, policies)
-    write_arrays(folder / SETS, **arrays)
-    whole = {"format": _format(kind), "version": VERSION, **structure}
+    save_policies(folder / POLICIES, content.policies)
+    write_arrays(folder / SETS, **content.arrays)
+    whole = {"format": _format(kind), "version": VERSION, **content.structure}
     sums = {name: _sum(read_bytes(folder / name)) for name in (SETS, POLICIES)}
     write_json(folder / STRUCTURE, {**whole, "sha256": {STRUCTURE: _sum_of_words(whole), **sums}})
 
 
-def read_chain(folder: Path, kind: str, *,
-               trust: bool) -> tuple[dict[str, Any], dict[str, np.ndarray], list[SkillPolicy]]:
+def read_chain(folder: Path, kind: str, *, trust: bool) -> ChainContent:
     """Return what `write_chain` was given.
 
     Args:
@@ -139,7 +142,7 @@ def read_chain(folder: Path, kind: str, *,
         warnings.warn(f"{path} was changed after it was written", stacklevel=3)
     arrays = read_arrays(folder / SETS)
     numbers = {name: take(folder / SETS, arrays, name, array.shape, kinds=NUMBERS) for name, array in arrays.items()}
-    return words, numbers, load_policies(folder / POLICIES, len(words["skills"]))
+    return ChainContent(words, numbers, load_policies(folder / POLICIES, len(words["skills"])))
 
 
 def _compare(path: Path, expected: str | None) -> None:

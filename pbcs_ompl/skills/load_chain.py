@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from pbcs_ompl.core.checked import checked
-from pbcs_ompl.skills import chain
+from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.chain_files import kind_in
-from pbcs_ompl.skills.path_following import chain as followed
+from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.trained_controller import TrainedController
 
-LOADERS = {chain.KIND: chain.SkillChain.load, followed.KIND: followed.FollowChain.load}
+CHAINS: dict[str, type[TrainedController]] = {one.kind: one for one in (SkillChain, FollowChain)}
 
 
 @checked
@@ -22,4 +22,4 @@ def load_chain(folder: str | Path, *, trust: bool = False) -> TrainedController:
     Raises:
         DamagedFile: a file is missing, truncated, or of another version.
     """
-    return LOADERS[kind_in(Path(folder))](folder, trust=trust)
+    return CHAINS[kind_in(Path(folder))].load(folder, trust=trust)

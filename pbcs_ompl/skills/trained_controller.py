@@ -4,15 +4,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar, Protocol, Self, TypedDict
 
 import numpy as np
 
+from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import Mismatch
+from pbcs_ompl.core.errors import DamagedFile, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
 from pbcs_ompl.resettable.actions import ActionMap, Actions
+from pbcs_ompl.skills.chain_files import ChainContent, read_chain, write_chain
 from pbcs_ompl.skills.episodes import with_random_actions
 
 
@@ -50,10 +52,21 @@ class Rollouts:
     states: Array
 
 
+class TaskValues(TypedDict):
+    """The attributes of a `TrainedController` that its task gives."""
+
+    start: Array
+    environment: EnvSpec
+    time_limit: int
+    actions: ActionMap
+    reset_seed: int | None
+
+
 class TrainedController(ABC):
     """A controller with the task it was trained for.
 
     Attributes:
+        kind: What its files say that they hold.
         start: The state it was trained to start from [D].
         environment: The environment it was trained in.
         time_limit: Steps after which an execution counts as failed.
@@ -61,6 +74,7 @@ class TrainedController(ABC):
         reset_seed: The seed of the reset that leads to the start; None where none is known to.
     """
 
+    kind: ClassVar[str]
     start: Array
     environment: EnvSpec
     time_limit: int
@@ -81,9 +95,47 @@ class TrainedController(ABC):
     def controller(self) -> StagedController:
         """Return the controller of observations, for one episode until its `reset` says otherwise."""
 
+    @property
     @abstractmethod
+    def content(self) -> ChainContent:
+        """What its files hold beside the task."""
+
+    @classmethod
+    @abstractmethod
+    def from_content(cls, content: ChainContent, task: "TaskValues") -> Self:
+        """Return the controller of `content` for a task; a KeyError, ValueError, TypeError or IndexError is damage."""
+
+    @checked
     def save(self, folder: str | Path) -> None:
-        """Write its files."""
+        """Write chain.json (structure), chain.npz (arrays) and chain.safetensors (policies)."""
+        structure, arrays, policies = self.content
+        own = {"environment": self.environment.to_dict(), "time_limit": self.time_limit, "reset_seed": self.reset_seed,
+               "action_shape": list(self.actions.shape)}
+        ends = {"start": self.start, "first_action": self.actions.first, "last_action": self.actions.last}
+        write_chain(Path(folder), self.kind, ChainContent(own | structure, ends | arrays, policies))
+
+    @classmethod
+    @checked
+    def load(cls, folder: str | Path, *, trust: bool = False) -> Self:
+        """Read what `save` wrote.
+
+        Args:
+            folder: The folder.
+            trust: Let its environment be made where that imports a module which the folder names.
+
+        Raises:
+            DamagedFile: a file is missing, truncated, or of another version.
+        """
+        content = read_chain(Path(folder), cls.kind, trust=trust)
+        structure, arrays = content.structure, content.arrays
+        try:
+            task = TaskValues(
+                start=arrays["start"], environment=EnvSpec.from_dict(structure["environment"], trusted=trust),
+                time_limit=structure["time_limit"], reset_seed=structure["reset_seed"],
+                actions=ActionMap(arrays["first_action"], arrays["last_action"], tuple(structure["action_shape"])))
+            return cls.from_content(content, task)
+        except (KeyError, ValueError, TypeError, IndexError) as error:
+            raise DamagedFile(f"{folder} holds a damaged {cls.kind}: {error}") from error
 
     def check_belongs_to(self, environment: EnvSpec) -> None:
         """Raise Mismatch when it was trained in another environment."""

@@ -14,12 +14,21 @@ import pytest
 @pytest.fixture
 def solve_rate(record_property: Callable[[str, object], None]) -> Callable[..., Any]:
     """Return `pbcs_ompl.testing.assert_solves`, whose rates also go into the closing table."""
-    from pbcs_ompl.testing.solve_rate import assert_solves  # loads OMPL, which other people's tests do not need
+    # loads OMPL, which other people's tests do not need
+    from pbcs_ompl.testing.solve_rate import SolveRate, TooFewSolved, assert_solves
+
+    def record(rate: SolveRate, where: Any) -> None:
+        record_property("solve_rate", [rate.planner, where or rate.env, rate.solved, len(rate.seeds)])
 
     def checked(planner: Any, env: str, env_kwargs: dict[str, Any] | None = None, *, where: Any = None,
                 **options: Any) -> Any:
-        rate = assert_solves(planner, env, env_kwargs, **options)
-        record_property("solve_rate", [rate.planner, where or rate.env, rate.solved, len(rate.seeds)])
+        __tracebackhide__ = True
+        try:
+            rate = assert_solves(planner, env, env_kwargs, **options)
+        except TooFewSolved as failed:
+            record(failed.rate, where)
+            raise
+        record(rate, where)
         return rate
 
     return checked

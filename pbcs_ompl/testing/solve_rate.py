@@ -37,6 +37,19 @@ class SolveRate:
         return "\n".join(lines + [_line(seed, result) for seed, result in zip(self.seeds, self.results, strict=True)])
 
 
+class TooFewSolved(AssertionError):
+    """A planner solves fewer seeds than a test demands.
+
+    Args:
+        rate: What it solves.
+        wanted: How many were demanded.
+    """
+
+    def __init__(self, rate: SolveRate, wanted: int):
+        super().__init__(f"expected at least {wanted} solved\n{rate}")
+        self.rate = rate
+
+
 def _line(seed: int, result: PlanResult | PbcsError) -> str:
     if isinstance(result, PbcsError):
         return f"{seed:>6}  {'error':<8}{'':>12}  {result}"
@@ -60,8 +73,9 @@ def assert_solves(planner: Any, env: str, env_kwargs: dict[str, Any] | None = No
         at_least: How many have to be solved; all by default.
 
     Raises:
-        AssertionError: too few; the message holds a line for each seed.
+        TooFewSolved: an AssertionError; the message holds a line for each seed.
     """
+    __tracebackhide__ = True  # pytest shows the user's line
     chosen = tuple(range(seeds)) if isinstance(seeds, int) else tuple(seeds)
     wanted = len(chosen) if at_least is None else at_least
     if not chosen or not 0 <= wanted <= len(chosen):
@@ -78,5 +92,5 @@ def assert_solves(planner: Any, env: str, env_kwargs: dict[str, Any] | None = No
     name = planner if isinstance(planner, str) else getattr(planner, "__name__", type(planner).__name__)
     rate = SolveRate(name, f"{env} {env_kwargs or {}}", chosen, tuple(results))
     if rate.solved < wanted:
-        raise AssertionError(f"expected at least {wanted} solved\n{rate}")
+        raise TooFewSolved(rate, wanted)
     return rate

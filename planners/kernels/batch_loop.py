@@ -3,9 +3,10 @@
 from numba import types
 
 from pbcs_ompl.core.compiled import njit
+from pbcs_ompl.core.step_kernels import call_step
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, call_step
+from pbcs_ompl.planners.compiled import PARAMETERS_TYPE
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
 from pbcs_ompl.planners.kernels.memory import uncounted
 

@@ -4,9 +4,10 @@ import numpy as np
 from numba import types
 
 from pbcs_ompl.core.compiled import njit
+from pbcs_ompl.core.step_kernels import call_step
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, call_step
+from pbcs_ompl.planners.compiled import PARAMETERS_TYPE
 from pbcs_ompl.planners.kernels.bin_queue import QUEUE_TYPE, BinQueue, add, grow_and_add
 from pbcs_ompl.planners.kernels.cells import cell_of, find_cell
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite

@@ -3,9 +3,9 @@
 import numpy as np
 
 from pbcs_ompl.core.compiled import njit
+from pbcs_ompl.core.step_kernels import call_step
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.planners.compiled import call_step
 from pbcs_ompl.planners.kernels.columns import finite
 from pbcs_ompl.planners.kernels.runs import Number
 

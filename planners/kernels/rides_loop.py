@@ -8,9 +8,10 @@ from numba.core.types import npy_rng
 from numpy.typing import NDArray
 
 from pbcs_ompl.core.compiled import njit
+from pbcs_ompl.core.step_kernels import call_step
 from pbcs_ompl.core.tree import Columns
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.planners.compiled import PARAMETERS_TYPE, call_step
+from pbcs_ompl.planners.compiled import PARAMETERS_TYPE
 from pbcs_ompl.planners.kernels.cells import cell_of, find_cell
 from pbcs_ompl.planners.kernels.columns import COLUMNS_TYPE, finite
 from pbcs_ompl.planners.kernels.memory import uncounted

@@ -27,6 +27,25 @@ def draw_sparse(queue: BinQueue, reach: int, rng: np.random.Generator, nodes: ND
 
 
 @njit()
+def draw_sparsest(queue: BinQueue, reach: int, rng: np.random.Generator, nodes: NDArray[np.int64]) -> None:
+    """Write into nodes [B] independent draws from those with the fewest nodes in the bins around, all as likely."""
+    cell = np.empty(queue.cells.shape[1], np.int64)
+    around = np.empty(queue.head[0].length, np.int64)
+    for number in range(len(around)):
+        around[number] = _around(queue, number, reach, cell)
+    sparsest = np.flatnonzero(around == around.min())
+    ends = np.empty(len(sparsest), np.int64)
+    count = 0
+    for index in range(len(sparsest)):
+        count += queue.heads[sparsest[index]].length
+        ends[index] = count
+    for row in range(len(nodes)):
+        chosen = int(rng.random() * count)
+        place = np.searchsorted(ends, chosen, side="right")
+        nodes[row] = queue.pool[queue.heads[sparsest[place]].start + ends[place] - 1 - chosen]
+
+
+@njit()
 def _around(queue: BinQueue, number: int, reach: int, cell: NDArray[np.int64]) -> int:
     """Return how many nodes are in the bins around one, itself included."""
     axes = len(cell)

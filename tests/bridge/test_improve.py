@@ -53,7 +53,7 @@ def test_plans_of_ex_come_close_to_the_shortest_with_a_tenth_of_its_transitions(
     ratios = []
     for seed in range(8):
         kwargs = {"size": size, "maze_seed": seed}
-        found = plan("pbcs/Maze-v0", env_kwargs=kwargs, seed=seed, improve="10%")
+        found = plan("pbcs/Maze-v0", "Ex", env_kwargs=kwargs, seed=seed, improve="10%")
         assert found.path_length is not None
         ratios.append(found.path_length / least_steps(MazeEnv(**kwargs)))
     assert min(ratios) >= 1.0
@@ -85,7 +85,7 @@ def test_a_plan_that_the_environment_does_not_grant_is_replaced_by_the_one_befor
         return shorter, note
 
     monkeypatch.setattr(module, "improve_plan", wrong)
-    found = plan("pbcs/Maze-v0", env_kwargs={"size": 3}, seed=0, improve=2000)
+    found = plan("pbcs/Maze-v0", "Ex", env_kwargs={"size": 3}, seed=0, improve=2000)
     assert found.solved
     assert found.improvement is not None
     assert found.path_length == found.improvement.after == found.improvement.before

@@ -169,7 +169,8 @@ def test_environment_is_given_in_four_ways(env):
 @pytest.mark.parametrize(("planner", "given", "expected"), [
     ("Ex", {}, {"bin_size": [0.15, 0.15], "batch": "grow", "control_duration": 1}),
     ("ex", {"bin_size": 0.2, "batch": 3}, {"bin_size": [0.2, 0.2], "batch": 3, "control_duration": 1}),
-    ("ESTAdapted", {"distance": [0.1, 0.3]}, {"distance": [0.1, 0.3], "batch": "grow", "control_duration": 1}),
+    ("ESTAdapted", {"distance": [0.1, 0.3]},
+     {"distance": [0.1, 0.3], "rule": "draw", "batch": "grow", "control_duration": 1}),
     ("RandomWalk", {"control_duration": 2}, {"max_steps": 180, "walkers": 1, "batch": "grow", "control_duration": 2}),
     ("RRTNH", {}, {"batch": "grow", "control_duration": 1}),
     ("RRT", {"goal_bias": 0.1}, {"goal_bias": 0.1, "intermediate_states": False, "control_duration": 1}),

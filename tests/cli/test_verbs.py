@@ -47,7 +47,7 @@ def test_plan_then_train_then_eval(pbcs, tmp_path):
     assert status == 0
     assert KEYS["plan"] <= set(plan)
     assert (plan["solved"], plan["replay_ok"], plan["seed"]) == (True, True, 3)
-    assert plan["out"] == "runs/plan-Maze-v0-Ex-3"
+    assert plan["out"] == "runs/plan-Maze-v0-Rides-3"
     files = {path.name for path in (tmp_path / plan["out"]).iterdir()}
     assert files == {".sha256", "config.toml", "provenance.json", "result.json", "trajectory.npz", "tree.npz",
                      "tree.png"}

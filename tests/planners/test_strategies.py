@@ -18,18 +18,20 @@ def tree_of(points, terminal=False):
     return tree
 
 
+@pytest.mark.parametrize("rule", ["draw", "least"])
 @pytest.mark.parametrize("features", [1, 2, 3, 5])
-def test_est_draws_nodes_by_the_inverse_of_omega(features):
-    """A node's frequency goes with 1 / (nodes in the 3^F cells around it); beyond 4 features, in its cell."""
+def test_est_draws_nodes_by_omega(features, rule):
+    """omega: the nodes in the 3^F cells around; beyond 4 features, in its cell."""
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(2.0, 0.2, (40, features)), rng.uniform(0, 4, (20, features))])
-    strategy = ESTAdapted()
+    strategy = ESTAdapted(rule=rule)
     strategy.start(context(features), rng)
     strategy.inserted(tree_of(points), 0, 60)
     reach = 1 if features <= 4 else 0
     cells = np.floor(points / (1.0 / (2 * reach + 1)))
     omega = (np.abs(cells[:, None] - cells[None]).max(axis=2) <= reach).sum(axis=1)
-    expected = (1.0 / omega) / (1.0 / omega).sum()
+    weights = 1.0 / omega if rule == "draw" else omega == omega.min()
+    expected = weights / weights.sum()
     hits = np.bincount(strategy.select(tree_of(points), 200_000), minlength=60) / 200_000
     assert np.abs(hits - expected).max() < 5 * np.sqrt(expected.max() / 200_000)
 
@@ -86,8 +88,8 @@ def test_random_walks_are_chains_from_the_root(solve, square, walkers):
 
 
 @pytest.mark.parametrize(("kind", "options"), [
-    (ESTAdapted, {"distance": 0.0}), (ESTAdapted, {"distance": "far"}), (RandomWalk, {"max_steps": 0}),
-    (RandomWalk, {"walkers": 1.5}),
+    (ESTAdapted, {"distance": 0.0}), (ESTAdapted, {"rule": "most"}), (ESTAdapted, {"distance": "far"}),
+    (RandomWalk, {"max_steps": 0}), (RandomWalk, {"walkers": 1.5}),
 ])
 def test_bad_values_are_refused(make_setup, square, kind, options):
     with pytest.raises(InvalidOption, match=next(iter(options))):

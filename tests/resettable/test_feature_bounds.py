@@ -68,8 +68,9 @@ def test_what_has_no_bounds_is_explored_beside_what_has() -> None:
     assert "the observation space and 500 random steps, widened" in feature_words(model)
 
 
-def test_goals_of_resets_lie_inside() -> None:
-    model, env = model_of("achieved_goal"), Pushed()
+@pytest.mark.parametrize("feature", ["achieved_goal", None])
+def test_goals_of_resets_lie_inside(feature: str | None) -> None:
+    model, env = model_of(feature), Pushed()
     for seed in range(200):
         observation, _ = env.reset(seed=seed)
         goal = observation["desired_goal"]

@@ -9,6 +9,7 @@ import pytest
 
 from pbcs_ompl.core.errors import InvalidOption, InvalidState, NotResettable
 from pbcs_ompl.resettable import adapt, check_resettable
+from pbcs_ompl.skills.robots.worlds import robot_of
 
 
 class Cart(gymnasium.Env):
@@ -73,6 +74,25 @@ def test_success_takes_no_part_in_distances_and_perturbations() -> None:
     assert model.is_valid(drawn).all()
     assert (drawn[:, 2] == 0.0).all()
     assert (np.linalg.norm(drawn[:, :2], axis=1) <= 0.1).all()
+
+
+def test_a_robot_is_put_into_states_with_the_flag() -> None:
+    class Disc:
+        place, symmetries = (0, 1), ()
+
+        def heading(self, observations: np.ndarray) -> np.ndarray:
+            return np.zeros(len(observations))
+
+        def turned(self, observations: np.ndarray, angles: np.ndarray) -> np.ndarray:
+            return observations
+
+        def put(self, states: np.ndarray, places: np.ndarray, angles: np.ndarray) -> np.ndarray:
+            assert states.shape[1] == 2
+            return states + places
+
+    model = adapt(type("Rolling", (Cart,), {"robot": Disc()})())
+    put = robot_of(model).put(np.array([[0.5, 0.5, 1.0]]), np.ones((1, 2)), np.zeros(1))
+    np.testing.assert_array_equal(put, [[1.5, 1.5, 0.0]])
 
 
 def test_misspelt_attributes_are_reported() -> None:

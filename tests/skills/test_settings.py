@@ -20,6 +20,7 @@ def test_the_thesis_preset_is_the_thesis():
     assert (settings.skill.alpha, settings.skill.min_stride, settings.skill.max_stride) == (10, 1, 1)
     assert (settings.episodes.beta, settings.episodes.max_steps, settings.episodes.epsilon) == (50, 50, 0.1)
     assert (settings.plan.remove_loops, settings.verify) == (False, False)
+    assert (settings.skill.stop_at_success, settings.starts.reject_invalid) == (False, False)
     assert settings.episodes.shaped
     assert not method_settings("pb", "thesis").episodes.shaped
 

@@ -36,12 +36,13 @@ def test_the_plugin_serves_tests_outside_of_this_project(pytester):
             solve_rate("Ex", "pbcs/Maze-v0", {"size": 2}, seeds=3, max_transitions=20_000)
 
         def test_too_much(solve_rate):
-            solve_rate("Ex", "pbcs/Maze-v0", {"size": 2}, seeds=3, max_transitions=10)
+            solve_rate("Rides", "pbcs/Maze-v0", {"size": 2}, seeds=3, max_transitions=10)
     """)
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
     result.assert_outcomes(passed=1, failed=1)
     result.stdout.fnmatch_lines(["*expected at least 3 solved*", "*solve rates, with 95 % Wilson intervals*",
-                                 "Ex *3/3 [[]44%, 100%[]]*"])
+                                 "Ex *3/3 [[]44%, 100%[]]*", "Rides *0/3 [[]0%, 56%[]]*"])
+    assert "solve_rate.py" not in result.stdout.str()  # the traceback ends in the user's test
 
 
 def test_the_table_has_a_row_for_everybody_and_a_column_for_every_place():

@@ -12,6 +12,7 @@ from pbcs_ompl.resettable.adapters.success_flag import as_vector
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes, plain_copies
 from pbcs_ompl.resettable.memory.memory import Memory
+from pbcs_ompl.resettable.observations import has_goals
 from pbcs_ompl.resettable.observing import state_observer
 from pbcs_ompl.resettable.rules import FeatureRule, Outcome, feature_rule, granted_success, selected_dims
 from pbcs_ompl.resettable.task_env import bare
@@ -115,8 +116,10 @@ class VectorEnv(RestorableEnv):
         super().__init__(inner, goal, feature)
 
     def default_feature(self) -> FeatureRule:
-        """Return what the environment itself calls its feature, else all of its state."""
+        """Return what the environment itself calls its feature, else its achieved goal, else all of its state."""
         dims = self._declared_dims
+        if self._offers.feature_dims is None and has_goals(self.inner):
+            return feature_rule("achieved_goal")
         return lambda outcome: np.asarray(outcome.env.get_env_state())[dims]
 
     def feature_box(self) -> tuple[Array, Array] | None:
@@ -135,7 +138,7 @@ class VectorEnv(RestorableEnv):
     def _dims(self) -> list[int] | None:
         """Which numbers of the environment's state are the feature; None if it is something else."""
         if self.feature_rule is None:
-            return self._declared_dims
+            return None if self._offers.feature_dims is None and has_goals(self.inner) else self._declared_dims
         chosen = selected_dims(self.feature_rule, "state", self._size)
         return None if chosen is None else list(chosen)
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import gymnasium
 import numpy as np
 
 from pbcs_ompl.core.errors import InvalidState
@@ -18,6 +17,7 @@ from pbcs_ompl.resettable.adapters.mujoco_state import PHYSICS, ModelParts, Phys
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes, plain_copies
 from pbcs_ompl.resettable.memory.memory import Memory
+from pbcs_ompl.resettable.observations import has_goals
 from pbcs_ompl.resettable.rules import FeatureRule, feature_rule
 from pbcs_ompl.resettable.simulation import Simulation, simulation_of
 from pbcs_ompl.resettable.supported import task_env
@@ -65,8 +65,7 @@ class MujocoEnv(RestorableEnv):
 
     def usual_rule(self) -> str:
         """Return the achieved goal where there is one, else the first two positions."""
-        space = bare(self.inner).observation_space
-        if isinstance(space, gymnasium.spaces.Dict) and "achieved_goal" in space.spaces:
+        if has_goals(self.inner):
             return "achieved_goal"
         return "qpos[0:2]" if self._simulation.model.nq > 1 else "qpos[0]"
 

@@ -15,7 +15,7 @@ from pbcs_ompl.core.errors import CallbackFailed
 from pbcs_ompl.core.types import Array, Capability
 from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.feature_bounds import feature_bounds, narrow_words
-from pbcs_ompl.resettable.observations import flat
+from pbcs_ompl.resettable.observations import flat, has_goals
 from pbcs_ompl.resettable.rules import (
     FeatureRule,
     GoalRule,
@@ -117,8 +117,8 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         return self.inner.seen(observation) if isinstance(self.inner, TaskEnv) else observation
 
     def default_feature(self) -> FeatureRule:
-        """Return what planners explore unless the user says otherwise."""
-        return feature_rule("obs")
+        """Return what planners explore unless the user says otherwise: the achieved goal where there is one."""
+        return feature_rule("achieved_goal" if has_goals(self.inner) else "obs")
 
     def reported_goal_distance(self, observation: Any) -> float | None:
         """Return the distance to the goal that an observation of `inner` shows; None where it shows none."""

@@ -6,6 +6,7 @@ import gymnasium
 import numpy as np
 
 from pbcs_ompl.core.errors import NotResettable
+from pbcs_ompl.core.robot import Robot
 from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.attributes import EnvAttributes
@@ -54,6 +55,7 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
         self.feature_periods = offers.feature_periods
         self.parallel_batch, self.perturb_by_rollouts = offers.parallel_batch, offers.perturb_by_rollouts
         self.walls, self.goal_circle = offers.walls, offers.goal_circle
+        self.robot = None if offers.robot is None else _FlaggedRobot(offers.robot)
         self.advance_towards = None if offers.advance_towards is None else self._advance_towards
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
@@ -121,6 +123,20 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
     def _advance_towards(self, states: Array, targets: Array) -> Array:
         assert self._offers.advance_towards is not None
         return self._offers.advance_towards(np.asarray(states)[:, :-1].copy(), targets)
+
+
+class _FlaggedRobot:
+    """A robot in states that end with the flag of success."""
+
+    def __init__(self, robot: Robot):
+        self._robot = robot
+        self.place, self.symmetries = robot.place, robot.symmetries
+        self.heading, self.turned = robot.heading, robot.turned
+
+    def put(self, states: Array, places: Array, angles: Array) -> Array:
+        """Return states [B, N + 1] with the robot moved and turned, none of them a success."""
+        moved = self._robot.put(states[:, :-1], places, angles)
+        return np.hstack([moved, np.zeros((len(moved), 1))])
 
 
 def as_vector(env: Any, state: Any) -> Array:

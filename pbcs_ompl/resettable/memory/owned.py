@@ -20,9 +20,9 @@ NOT_STATE = frozenset({"np_random", "_np_random", "_np_random_seed", "spec", "me
 """Attributes that every environment may have and that no step depends on; generators are looked at by themselves."""
 LIBRARIES = frozenset({"numpy", "gymnasium", "mujoco", "glfw", "OpenGL", "pygame", "PIL", "cv2", "imageio",
                        "matplotlib", "logging", "numba", "xml"})
+"""Packages whose objects are no state of an environment: spaces, renderers, logs. Generators are looked at apart."""
 SIMULATION = "dm_control.mujoco"
 """The package whose objects are MuJoCo's model and data, which are saved as such."""
-"""Packages whose objects are no state of an environment: spaces, renderers, logs. Generators are looked at apart."""
 DEEPEST = 6
 MOST_OBJECTS = 2000
 GENERATORS = (np.random.Generator, np.random.RandomState, np.random.BitGenerator, random.Random)

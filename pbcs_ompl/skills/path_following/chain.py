@@ -2,25 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from pbcs_ompl.agents.policy import Policy
-from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.actions import ActionMap
-from pbcs_ompl.skills.chain_files import read_chain, write_chain
+from pbcs_ompl.skills.chain_files import ChainContent
 from pbcs_ompl.skills.path_following.follower import Follower, LineView
 from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.path_following.task import FollowTask
 from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
-from pbcs_ompl.skills.trained_controller import TrainedController, actions_of
+from pbcs_ompl.skills.trained_controller import TaskValues, TrainedController, actions_of
 from pbcs_ompl.skills.waypoints import Waypoints
-
-KIND = "follower"
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +30,7 @@ class FollowChain(TrainedController):
         start, environment, time_limit, actions, reset_seed: See `TrainedController`.
     """
 
+    kind = "follower"
     policies: tuple[Policy, ...]
     firsts: tuple[int, ...]
     line: Line
@@ -74,47 +70,26 @@ class FollowChain(TrainedController):
         """Return the controller of observations, for one episode until its `reset` says otherwise."""
         return Follower(self.policies, self.firsts, self.line, self.view, self.actions)
 
-    @checked
-    def save(self, folder: str | Path) -> None:
-        """Write chain.json (structure), chain.npz (the line, what policies see) and chain.safetensors (policies)."""
+    @property
+    def content(self) -> ChainContent:
+        """The line and what policies see as arrays, the pointers from which they act in the structure."""
         view = self.view
-        arrays = {"start": self.start, "first_action": self.actions.first, "last_action": self.actions.last,
-                  "points": self.line.points, "pass_radius": np.array(self.line.pass_radius),
+        arrays = {"points": self.line.points, "pass_radius": np.array(self.line.pass_radius),
                   "entries": view.entries, "unit": view.unit, "origin": view.normaliser.origin,
                   "scale": view.normaliser.scale, "distances": view.distances}
-        structure = {
-            "environment": self.environment.to_dict(), "time_limit": self.time_limit, "reset_seed": self.reset_seed,
-            "action_shape": list(self.actions.shape), "skills": [{"first": int(first)} for first in self.firsts],
-            "spacing": self.line.spacing, "window": view.window, "patience": view.patience}
-        write_chain(Path(folder), KIND, structure, arrays,
-                    [SkillPolicy(policy, ObservationTransform.identity(view.size)) for policy in self.policies])
+        structure = {"skills": [{"first": int(first)} for first in self.firsts], "spacing": self.line.spacing,
+                     "window": view.window, "patience": view.patience}
+        return ChainContent(structure, arrays, [SkillPolicy(policy, ObservationTransform.identity(view.size))
+                                                for policy in self.policies])
 
     @classmethod
-    @checked
-    def load(cls, folder: str | Path, *, trust: bool = False) -> "FollowChain":
-        """Read what `save` wrote.
-
-        Args:
-            folder: The folder.
-            trust: Let its environment be made where that imports a module which the folder names.
-
-        Raises:
-            DamagedFile: a file is missing, truncated, or of another version.
-        """
-        folder = Path(folder)
-        structure, arrays, policies = read_chain(folder, KIND, trust=trust)
-        try:
-            view = LineView(arrays["entries"].astype(np.int64), arrays["unit"],
-                            ObservationTransform(arrays["origin"], arrays["scale"]), arrays["distances"],
-                            structure["window"], structure["patience"])
-            actions = ActionMap(arrays["first_action"], arrays["last_action"], tuple(structure["action_shape"]))
-            return cls(tuple(policy.actor for policy in policies),
-                       tuple(place["first"] for place in structure["skills"]),
-                       Line(arrays["points"], structure["spacing"], float(arrays.get("pass_radius", np.inf))), view,
-                       arrays["start"],
-                       EnvSpec.from_dict(structure["environment"], trusted=trust), structure["time_limit"], actions,
-                       structure["reset_seed"])
-        except (KeyError, ValueError, TypeError, IndexError) as error:
-            raise DamagedFile(f"{folder} holds a damaged follower: {error}") from error
-
-
+    def from_content(cls, content: ChainContent, task: TaskValues) -> "FollowChain":
+        """Return the policies of `content` for a task."""
+        structure, arrays, policies = content
+        view = LineView(arrays["entries"].astype(np.int64), arrays["unit"],
+                        ObservationTransform(arrays["origin"], arrays["scale"]), arrays["distances"],
+                        structure["window"], structure["patience"])
+        return cls(policies=tuple(policy.actor for policy in policies),
+                   firsts=tuple(place["first"] for place in structure["skills"]),
+                   line=Line(arrays["points"], structure["spacing"], float(arrays.get("pass_radius", np.inf))),
+                   view=view, **task)

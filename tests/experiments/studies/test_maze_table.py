@@ -94,4 +94,4 @@ def test_the_first_seed_is_drawn(label, tmp_path):
         "rollout": [[0.5, 0.5], [1.5, 1.0], [0.5, 1.5]], "activations": [[[0.5, 0.5], 0.1]]}
     STUDY.analyse([pictured], tmp_path)
     assert (tmp_path / "mazes.png").stat().st_size > 5000
-    assert (tmp_path / "chain-2x2.png").is_file() == (label == "PBCS")
+    assert (tmp_path / "chains.png").is_file() == (label == "PBCS")

@@ -10,6 +10,7 @@ import pytest
 
 from pbcs_ompl.experiments.claims import greater
 from pbcs_ompl.experiments.studies.exploration_trees import study as trees
+from pbcs_ompl.experiments.studies.presets import study as presets
 from pbcs_ompl.experiments.studies.toy_analysis import study as toy
 from pbcs_ompl.experiments.studies.toy_analysis.random_walk import found_by
 from pbcs_ompl.experiments.studies.tree_pitfalls import study as pitfalls
@@ -24,7 +25,8 @@ SMALL = {
                      "ddpg-ornstein-uhlenbeck": {"agent": "ddpg", "noise": "ornstein-uhlenbeck", "expert_after": 50}},
         "drift": {"seeds": 2, "updates": 100, "every": 50, "transitions": 100}},
     "tree-pitfalls": {"paradox": {"ring": 16, "radius": 0.5, "expansions": 50}, "neighbours": {"sizes": [100, 300]},
-                      "growth": {"planners": ["Ex", "RRTNH"], "sizes": [300, 1000]}},
+                      "growth": {"planners": ["Ex", "RRTNH"], "sizes": [300, 1000]},
+                      "est": {"sizes": [2], "max_transitions": 3000}},
     "toy-analysis": {"walks": 20_000, "steps": 22, "toy": {"agents": 50, "initialisation": "glorot"}},
     "exploration-trees": {"scenes": {
         "box": {"env": "pbcs/Box-v0", "transitions": 300},
@@ -52,7 +54,8 @@ SMALL = {
     "skills-beyond-mazes": {"tasks": {
         name: {"env": "pbcs/Maze-v0", "env_kwargs": {"size": 2}, "max_transitions": 3000, "seeds": 1}
         for name in ("small", "small-learnt", "again")}},
-    "presets": {"max_transitions": 1500, "sizes": {"2": {"seeds": 1}}},
+    "presets": {"max_transitions": 800, "sizes": [2], "changes": {
+        "networks of 64 units": ["hidden"], "50 at once": ["episodes_per_batch", "updates_per_transition"]}},
     "antmaze-exploration": {"max_transitions": 100},
     "closed-loop": {
         "noise": [0.0, 0.1], "plan_transitions": 5000,
@@ -112,6 +115,13 @@ def test_without_records_no_claim_is_decided(name, tmp_path, monkeypatch):
 def test_every_run_has_a_name_and_plain_settings(name):
     runs = find_study(name).all_runs()
     assert len({run.name for run in runs}) == len(runs) > 0
+
+
+def test_the_changes_lead_from_one_preset_to_the_other_and_each_setting_changes_once():
+    differ = {name for values in (presets.method_values, presets.agent_values)
+              for name, value in values("thesis").items() if value != values("fast")[name]}
+    changes = find_study("presets").sweep["changes"].values()
+    assert sorted(differ) == sorted(setting for change in changes for setting in change)
 
 
 def test_evenness_is_the_share_of_what_a_tree_fills_evenly():

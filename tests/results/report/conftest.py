@@ -29,8 +29,8 @@ def analyse(records, figures):
 ''',
 }
 LINES = {
-    "plan": (0, f"plan {MAZE} --goal 'reward>0' --planner-kwargs '{{\"control_duration\": 2}}' --max-seconds 60"
-             " --improve 10"),
+    "plan": (0, f"plan {MAZE} --goal 'reward>0' --planner Ex --planner-kwargs '{{\"control_duration\": 2}}'"
+             " --max-seconds 60 --improve 10"),
     "given": (1, f"train {MAZE} --path runs/plan --max-transitions 4000 --settings '{{\"beta\": 20}}'"),
     "training": (0, f"train {MAZE} --seed 3 --agent-settings '{{\"batch_size\": 90}}'"),
     "evaluation": (0, "eval runs/training --episodes 7 --epsilon 0.1"),

@@ -20,7 +20,8 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
     chosen = range(sweep["first_seed"], sweep["first_seed"] + seeds)
     common = {key: sweep[key] for key in ("preset", "max_transitions")}
     trainings = [{"name": f"{_plain_name(label)}-{discount}-{reward}-{seed}", "label": label, "reward": reward,
-                  "method": way["method"], "discount": float(discount), "seed": seed, **common,
+                  "method": way["method"], "planner": way.get("planner"), "discount": float(discount), "seed": seed,
+                  **common,
                   "settings": {"shaped": shaped, "max_steps": EPISODE, "exact": True} | way.get("settings", {})}
                  for seed in chosen for label, way in sweep["methods"].items()
                  for discount in way.get("discounts", sweep["discounts"].values())
@@ -37,8 +38,9 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     """Train once, or count the visits of agents."""
     if settings["label"] == "alone":
         return _alone(settings)
-    record, _ = trained("pbcs/Maze-v0", MAZE, agent_settings={"discount": settings["discount"]},
-                        **{key: settings[key] for key in ("method", "settings", "preset", "seed", "max_transitions")})
+    options = {key: settings[key]
+               for key in ("method", "planner", "settings", "preset", "seed", "max_transitions")}
+    record, _ = trained("pbcs/Maze-v0", MAZE, agent_settings={"discount": settings["discount"]}, **options)
     return settings | record
 
 

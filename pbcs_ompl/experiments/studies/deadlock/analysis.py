@@ -7,11 +7,20 @@ import numpy as np
 
 from pbcs_ompl.experiments.claims import Claim, about, always, at_least, higher, never, rate, sometimes
 from pbcs_ompl.experiments.studies.deadlock.drawing import MINI_BATCHES, draw, draw_drift
-from pbcs_ompl.experiments.studies.deadlock.variants import EARLY, GREEDY, OU, TD3, Variant, variants_of
+from pbcs_ompl.experiments.studies.deadlock.variants import (
+    ARGMAX,
+    EARLY,
+    GREEDY,
+    OU,
+    REGRESSION,
+    SAC,
+    TD3,
+    Variant,
+    variants_of,
+)
 
 SATURATED = 0.099
-VARIANTS = {"ddpg-argmax-epsilon-greedy": "Fig. 6.10(a)", "sac-epsilon-greedy": "Fig. 6.10(b)",
-            "ddpg-regression-epsilon-greedy": "6.6.3, Eq. 6.5"}
+VARIANTS = {ARGMAX: "Fig. 6.10(a)", SAC: "Fig. 6.10(b)", REGRESSION: "6.6.3, Eq. 6.5"}
 EXPECTED_FAILURES = {GREEDY: (0.01, 0.02), OU: (0.06, 0.03)}
 """What the thesis has, and what counts as near."""
 LATEST = 1600

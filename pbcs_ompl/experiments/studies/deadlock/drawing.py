@@ -8,12 +8,17 @@ import numpy as np
 
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.experiments.stacked_training import joined_rows
-from pbcs_ompl.experiments.studies.deadlock.variants import GREEDY, OU, Variant
+from pbcs_ompl.experiments.studies.deadlock.variants import ARGMAX, GREEDY, OU, REGRESSION, SAC, TD3, Variant
 from pbcs_ompl.figures.canvas import colour, new_panels, publish
-from pbcs_ompl.figures.diagnostics import critic_map_figure, curves_figure, slices_figure, success_figure
+from pbcs_ompl.figures.diagnostics import curves_figure, stuck_critic_figure, success_figure
 
 OBSERVED = {"saturation": "saturated actions", "flat_share": "flat share", "deadlock_index": "deadlock index",
             "distance_to_returns": "mean |Q - Q^π|"}
+NOISES = {"(a) noises": (GREEDY, OU), "(b) optimal behaviour from step 20,000 on": (
+    GREEDY, OU, f"{GREEDY}-expert", f"{OU}-expert")}
+ALGORITHMS = {"(a) DDPG-argmax": (GREEDY, ARGMAX), "(b) SAC": (GREEDY, SAC), "TD3 and the regression of Eq. 6.5": (
+    GREEDY, TD3, REGRESSION)}
+"""The variants in each panel."""
 SLICED_STATES = (0.0, 0.05, 0.1, 0.3)
 BINS = (0, 50, 100, 200, 400, 800, 1600)
 """Steps of the first reward that are distinguished, as powers of two of the longest episode."""
@@ -36,15 +41,13 @@ def draw_drift(drift: dict[str, Any], figures: Path) -> None:
 def draw(variants: dict[str, Variant], figures: Path) -> None:
     """Draw success, first rewards, and what failed seeds look like."""
     leaving = _leaving(variants)
-    for words, names, file in (("noises (Fig. 6.2a)", (GREEDY, OU), "success"),
-                               ("algorithms (Fig. 6.10a,b)", [n for n in variants if n.endswith("epsilon-greedy")],
-                                "algorithms"),
-                               ("optimal behaviour later (Fig. 6.2b)",
-                                [n for n in variants if n.endswith("-expert") or f"{n}-expert" in variants], "expert")):
-        curves = {variants[name].name: (variants[name].steps, variants[name].success)
-                  for name in names if name in variants}
-        if curves:
-            publish(success_figure(curves, title=f"1D-Toy: {words}{leaving}"), figures / f"{file}.png")
+    for words, panels, file in ((f"1D-Toy (Fig. 6.2){leaving}", NOISES, "success"),
+                                (f"1D-Toy (Fig. 6.10a, b){leaving}", ALGORITHMS, "algorithms")):
+        curves = {title: {variants[name].name: (variants[name].steps, variants[name].success)
+                          for name in names if name in variants} for title, names in panels.items()}
+        shown = {title: one for title, one in curves.items() if one}
+        if shown:
+            publish(success_figure(shown, title=words), figures / f"{file}.png")
     _draw_first_rewards(variants, figures)
     _draw_rewarded(variants, figures)
     for name, chosen in variants.items():
@@ -116,16 +119,7 @@ def _draw_rewarded(variants: dict[str, Variant], figures: Path) -> None:
 
 def _draw_critic(variant: str, name: str, one: dict[str, Any], figures: Path) -> None:
     """Draw a failed seed's critic over states and actions, and along the actions in a few states."""
-    states, actions, values = np.array(one["states"]), np.array(one["actions"]), np.array(one["values"])
-    title = f"{name}, failed seed {one['seed']}"
-    publish(critic_map_figure(states, actions, values, np.array(one["chosen"]), title=f"{title}: Q(s, a) (Fig. 6.5a)"),
-            figures / f"critic-{variant}-map.png")
-    rows = {f"s = {state:g}": int(np.abs(states - state).argmin()) for state in SLICED_STATES}
-    slices = {label: values[row] for label, row in rows.items()}
-    chosen = {label: one["chosen"][row] for label, row in rows.items()}
-    title = f"{title}: Q(s, .)"
-    publish(slices_figure(actions, slices, chosen, title=f"{title} (Fig. 6.5b)"), figures / f"critic-{variant}.png")
-    ends = [float(np.interp(chosen[label], actions, slices[label])) for label in rows]
-    span = max(1e-3, 0.02 * float(np.ptp(values)))
-    publish(slices_figure(actions, slices, chosen, title=f"{title}, enlarged (Fig. 6.9b)",
-                          ylim=(min(ends) - span, max(ends) + span)), figures / f"critic-{variant}-enlarged.png")
+    states, actions, values, chosen = (np.array(one[key]) for key in ("states", "actions", "values", "chosen"))
+    publish(stuck_critic_figure(states, actions, values, chosen, sliced=SLICED_STATES,
+                                title=f"{name}, failed seed {one['seed']} (Figs. 6.5 and 6.9b)"),
+            figures / f"critic-{variant}.png")

@@ -23,13 +23,14 @@ DIGITS = 5
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
-    """One run for each stack of each variant, and one on Drift."""
+    """One run for each stack of each variant, the first seeds of all variants first, and one on Drift."""
     common = {"agent_settings": sweep["agent"], "device": sweep["device"]}
     stack = sweep["stack"][sweep["device"].partition(":")[0]]
     stacks = [{"name": f"{variant}-{chunk[0]}-{chunk[-1]}", "variant": variant, "seeds": chunk, "loop": sweep["loop"],
                **common, **options}
               for variant, options in sweep["variants"].items()
               for chunk in chunks(min(seeds, options.get("most_seeds", seeds)), stack)]
+    stacks.sort(key=lambda settings: settings["seeds"][0])
     return [*stacks, {"name": "drift", "variant": "drift", "agent": "ddpg", "drift": sweep["drift"], **common}]
 
 

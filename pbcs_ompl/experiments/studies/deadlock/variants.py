@@ -9,11 +9,12 @@ from pbcs_ompl.experiments.stacked_training import joined_first_rewards, joined_
 
 EARLY = 50
 GREEDY, OU, TD3 = "ddpg-epsilon-greedy", "ddpg-ornstein-uhlenbeck", "td3-epsilon-greedy"
+SAC, ARGMAX, REGRESSION = "sac-epsilon-greedy", "ddpg-argmax-epsilon-greedy", "ddpg-regression-epsilon-greedy"
 NAMES = {GREEDY: "DDPG, ε-greedy noise", OU: "DDPG, Ornstein-Uhlenbeck noise",
          f"{GREEDY}-expert": "DDPG, ε-greedy, then optimal behaviour",
          f"{OU}-expert": "DDPG, Ornstein-Uhlenbeck, then optimal behaviour", TD3: "TD3",
-         "ddpg-regression-epsilon-greedy": "DDPG, regression (Eq. 6.5)", "sac-epsilon-greedy": "SAC",
-         "ddpg-argmax-epsilon-greedy": "DDPG-argmax"}
+         REGRESSION: "DDPG, regression (Eq. 6.5)", SAC: "SAC",
+         ARGMAX: "DDPG-argmax"}
 """What a reader calls the variants."""
 
 

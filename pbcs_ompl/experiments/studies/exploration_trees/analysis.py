@@ -7,22 +7,18 @@ import numpy as np
 
 from pbcs_ompl.experiments.claims import Claim, about, always, greater, rate
 from pbcs_ompl.figures.by_group import values_figure
-from pbcs_ompl.figures.canvas import publish
-from pbcs_ompl.figures.tree import tree_figure
+from pbcs_ompl.figures.canvas import new_panels, publish
+from pbcs_ompl.figures.maze import draw_map
+from pbcs_ompl.figures.tree import draw_tree
 from pbcs_ompl.resettable import make
 
-FIGURES = {("box", "RRTSteered"): "3.2a", ("box", "RRTNH"): "3.3a", ("box", "Ex"): "3.4a",
-           ("disc", "RRTSteered"): "3.2b", ("disc", "RRTNH"): "3.3b", ("disc", "Ex"): "3.4b",
-           ("maze", "RRTNH"): "4.3", ("maze", "Ex"): "4.3"}
-"""Which figure of [Matheron2020] a tree is like."""
+PLANNERS = ("RRTSteered", "RRTNH", "Ex")
 NAMES = {"RRTSteered": "RRT", "RRTNH": "RRT-NH"}
 
 
 def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
     """Draw one tree of each kind; compare evenness and coverage, seed by seed."""
-    for record in records:
-        if "states" in record:
-            _draw_trees(record, figures)
+    _draw_trees(records, figures)
     _draw_evenness(records, figures)
     return [*_even_trees(records), *_samples_outside(records), *_mazes(records)]
 
@@ -89,18 +85,35 @@ def _longer_than_optimal(records: list[dict[str, Any]]) -> list[Claim]:
     return claims
 
 
-def _draw_trees(record: dict[str, Any], figures: Path) -> None:
-    model = make(record["env"], record.get("env_kwargs", {}))
-    name = f"{record['scene']}-{record['planner']}"
-    planner = NAMES.get(record["planner"], record["planner"])
-    title = f"{planner}, {record['transitions']:,} transitions: evenness {record['evenness']:.2f}"
-    number = FIGURES.get((record["scene"], record["planner"]))
-    publish(tree_figure(model, np.array(record["states"]), np.array(record["parents"]),
-                     title=f"{title} (Fig. {number})" if number else title), figures / f"{name}.png")
-    if "path" in record:
-        title = f"{planner} up to the first reward: {record['first_reward']:,} transitions (Fig. 4.2)"
-        publish(tree_figure(model, np.array(record["found_states"]), np.array(record["found_parents"]),
-                         path=np.array(record["path"]), title=title), figures / f"{name}-first-reward.png")
+def _draw_trees(records: list[dict[str, Any]], figures: Path) -> None:
+    """Draw the trees of the first seed: in box and disc, and in the maze."""
+    drawn = {(record["scene"], record["planner"]): record for record in records if "states" in record}
+    _draw_panels([[(drawn.get((scene, planner)), "") for planner in PLANNERS] for scene in ("box", "disc")],
+                 "Trees of 2,000 transitions (Figs. 3.2 to 3.4)", figures / "trees.png")
+    _draw_panels([[(drawn.get(("maze", planner)), prefix) for planner in PLANNERS[1:]] for prefix in ("found_", "")],
+                 "2x2 maze: up to the first reward (Fig. 4.2), and regardless of it (Fig. 4.3)",
+                 figures / "maze-trees.png")
+
+
+def _draw_panels(rows: list[list[tuple[dict[str, Any] | None, str]]], title: str, path: Path) -> None:
+    """Draw trees side by side; prefix "found_" for what there was at the first reward."""
+    if not any(record for row in rows for record, _ in row):
+        return
+    figure, panels = new_panels(len(rows), len(rows[0]), 4.4 * len(rows[0]), 4.0 * len(rows))
+    for axes, (record, prefix) in zip(panels, [one for row in rows for one in row], strict=True):
+        if record is None or f"{prefix}states" not in record:
+            axes.remove()
+            continue
+        model, path_found = make(record["env"], record.get("env_kwargs", {})), record.get("path") if prefix else None
+        draw_map(axes, model)
+        lines, _ = draw_tree(axes, model, np.array(record[f"{prefix}states"]), np.array(record[f"{prefix}parents"]),
+                             path=None if path_found is None else np.array(path_found))
+        name = NAMES.get(record["planner"], record["planner"])
+        axes.set_title(f"{name}: {record['first_reward']:,} transitions, path of {record['path_length']} steps"
+                       if prefix else f"{name}: evenness {record['evenness']:.2f}", fontsize=9)
+        figure.colorbar(lines, ax=axes, shrink=0.6, pad=0.02, label="depth")
+    figure.suptitle(title, fontsize=10)
+    publish(figure, path)
 
 
 def _draw_evenness(records: list[dict[str, Any]], figures: Path) -> None:

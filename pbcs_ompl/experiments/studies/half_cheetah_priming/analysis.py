@@ -5,16 +5,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from scipy.stats import t
 
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.experiments.claims import PAIRS, Claim, always, at_least, at_most, greater_apart, rate
-from pbcs_ompl.figures.canvas import BAND, new_figure, publish
+from pbcs_ompl.figures.canvas import BAND, colour, new_panels, publish
 
 LATE = 10
 """Episodes of the actor itself that say what has become of it; the thesis smooths over as many."""
 GOOD, SOLVED = 0.975, 0.95
 """Shares of the best return: the thesis asks the first of the good policy; we call a mean above the second solved."""
+
+PANELS = {"": "alone (Fig. 6.10c)", "-primed": "with a good policy in one episode of twenty (Fig. 6.11)"}
+NAMES = {"ddpg": "DDPG", "ddpg-argmax": "DDPG-argmax"}
 
 
 class Variant:
@@ -47,11 +51,8 @@ def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
     """Draw the curves, and compare what the actors have come to."""
     names = list(dict.fromkeys(record["variant"] for record in records))
     variants = {name: Variant([record for record in records if record["variant"] == name]) for name in names}
-    for ending, figure in (("", "6.10c"), ("-primed", "6.11")):
-        chosen = {name: variants[name] for name in (f"ddpg{ending}", f"ddpg-argmax{ending}") if name in variants}
-        if chosen:
-            _draw(chosen, f"Sparse HalfCheetah{', primed' if ending else ''} (Fig. {figure})",
-                  figures / f"returns{ending}.png")
+    if variants:
+        _draw(variants, figures)
     return [*_found(variants), *_compared(variants), *_primed(variants)]
 
 
@@ -104,23 +105,32 @@ def _primed(variants: dict[str, Variant]) -> list[Claim]:
     return claims
 
 
-def _draw(variants: dict[str, Variant], title: str, path: Path) -> None:
-    """Draw mean and one standard deviation, as the thesis does, of the returns smoothed over LATE episodes."""
-    figure, axes = new_figure(7.2, 4.6)
-    for name, chosen in variants.items():
-        smooth = np.array([_moving_average(row) for row in chosen.returns])
-        episodes, mean, spread = chosen.episodes[-smooth.shape[1]:], smooth.mean(axis=0), smooth.std(axis=0)
-        (line,) = axes.plot(episodes, mean, linewidth=2, label=f"{name} (N = {chosen.seeds})")
-        axes.fill_between(episodes, mean - spread, mean + spread, color=line.get_color(), alpha=BAND, linewidth=0)
-        for row in smooth:
-            axes.plot(episodes, row, color=line.get_color(), linewidth=0.6, alpha=0.6)
-    axes.axhline(next(iter(variants.values())).best, color="gray", linewidth=0.8, linestyle="--")
-    axes.set_xlabel("episodes of 1000 steps; those of the good policy are left out")
-    axes.set_ylabel(f"return, mean of {LATE} episodes; band: one deviation")
-    axes.set_title(title, fontsize=10)
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False, fontsize=9)
-    publish(figure, path)
+def _draw(variants: dict[str, Variant], figures: Path) -> None:
+    """Draw the returns, smoothed over LATE episodes: all seeds, the mean and its 95 % interval by Student's t."""
+    figure, panels = new_panels(1, 2, 11.0, 4.6)
+    for axes, (ending, title) in zip(panels, PANELS.items(), strict=True):
+        for index, name in enumerate(("ddpg", "ddpg-argmax")):
+            if f"{name}{ending}" in variants:
+                _draw_returns(axes, variants[f"{name}{ending}"], NAMES[name], colour(index))
+        axes.axhline(next(iter(variants.values())).best, color="gray", linewidth=0.8, linestyle="--")
+        axes.set_xlabel("episodes of 1000 steps; those of the good policy are left out")
+        axes.set_title(title, fontsize=10)
+        axes.grid(alpha=0.3)
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(frameon=False, fontsize=9)
+    panels[0].set_ylabel(f"return, mean of {LATE} episodes; band: 95 % (Student's t)")
+    figure.suptitle("Sparse HalfCheetah", fontsize=10)
+    publish(figure, figures / "returns.png")
+
+
+def _draw_returns(axes: Axes, chosen: Variant, name: str, shade: str) -> None:
+    smooth = np.array([_moving_average(row) for row in chosen.returns])
+    episodes, mean = chosen.episodes[-smooth.shape[1]:], smooth.mean(axis=0)
+    axes.plot(episodes, mean, linewidth=2, color=shade, label=f"{name} (N = {chosen.seeds})")
+    axes.plot(episodes, smooth.T, color=shade, linewidth=0.6, alpha=0.6)
+    if chosen.seeds > 1:
+        reach = t.ppf(0.975, chosen.seeds - 1) * smooth.std(axis=0, ddof=1) / np.sqrt(chosen.seeds)
+        axes.fill_between(episodes, mean - reach, mean + reach, color=shade, alpha=BAND, linewidth=0)
 
 
 def _moving_average(values: Array) -> Array:

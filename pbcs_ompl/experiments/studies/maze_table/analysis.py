@@ -20,9 +20,9 @@ from pbcs_ompl.experiments.claims import (
     sometimes,
 )
 from pbcs_ompl.figures.by_group import rates_figure, values_figure
-from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED, new_figure, publish
-from pbcs_ompl.figures.chain import chain_figure
-from pbcs_ompl.figures.maze import draw_map, project_2d
+from pbcs_ompl.figures.canvas import GREEN, PURPLE, RED, new_figure, new_panels, publish
+from pbcs_ompl.figures.chain import draw_chain
+from pbcs_ompl.figures.maze import draw_map, legend_below, project_2d
 from pbcs_ompl.resettable import make
 
 Records = list[dict[str, Any]]
@@ -41,9 +41,7 @@ def analyse(records: Records, figures: Path) -> list[Claim]:
     """Draw Figs. 7.3 and 7.4 and the rates behind them; compare the methods."""
     _draw_rates(records, figures)
     _draw_table(records, figures)
-    for record in _of(records, "PBCS"):
-        if "rollout" in record:
-            _draw_chain(record, figures)
+    _draw_chains([record for record in _of(records, "PBCS") if "rollout" in record], figures)
     return [*_bars(records), *_alone(records), *_backplay(records), *_compared(records), _skills(records),
             *_followed(records)]
 
@@ -204,10 +202,21 @@ def _draw_one(record: dict[str, Any], axes: Any) -> None:
     axes.set_title(f"{record['label']}, {record['transitions']:,}", fontsize=9)
 
 
-def _draw_chain(record: dict[str, Any], figures: Path) -> None:
-    size = record["size"]
-    figure = chain_figure(make("pbcs/Maze-v0", record["env_kwargs"]), trajectory=np.array(record["plan"]),
-                          rollout=np.array(record["rollout"]),
-                          activations=[(np.array(centre), radius) for centre, radius in record["activations"]],
-                          title=f"PBCS, {record['transitions']:,} transitions, seed {record['seed']} (Fig. 7.4)")
-    publish(figure, figures / f"chain-{size}x{size}.png")
+def _draw_chains(records: Records, figures: Path) -> None:
+    """Draw the chain of the first seed of each size, as Fig. 7.4."""
+    if not records:
+        return
+    columns = min(4, len(records))
+    figure, panels = new_panels(-(-len(records) // columns), columns, 4.2 * columns, 4.6 * -(-len(records) // columns))
+    for axes in panels[len(records):]:
+        axes.remove()
+    for axes, record in zip(panels, sorted(records, key=lambda one: int(one["size"])), strict=False):
+        model = make("pbcs/Maze-v0", record["env_kwargs"])
+        draw_map(axes, model)
+        draw_chain(axes, model, trajectory=np.array(record["plan"]), rollout=np.array(record["rollout"]),
+                   activations=[(np.array(centre), radius) for centre, radius in record["activations"]])
+        axes.set_title(f"{record['size']}x{record['size']}, seed {record['seed']}: {record['transitions']:,} "
+                       f"transitions{'' if record['solved'] else ', not solved'}", fontsize=9)
+        legend_below(axes, columns=2)
+    figure.suptitle("PBCS (Fig. 7.4)", fontsize=10)
+    publish(figure, figures / "chains.png")

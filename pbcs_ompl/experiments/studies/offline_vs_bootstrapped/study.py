@@ -14,6 +14,8 @@ from pbcs_ompl.experiments.stacked_training import LoopSettings, StackedTraining
 from pbcs_ompl.resettable import make
 from pbcs_ompl.skills.exploration import explore
 
+MAZE = {"wall_penalty": -1.0, "terminate_on_success": False}
+"""The mazes of chapter 4."""
 GRID = 60
 """Cells of the pictures along each axis."""
 HALF_WALL = 0.05
@@ -21,18 +23,19 @@ HALF_WALL = 0.05
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
-    """One run for each stack of each variant, and one of mini-batches."""
+    """One run for each stack of each variant, the first seeds of all variants first, and one of mini-batches."""
     common = {key: sweep[key] for key in ("evaluate_every", "episode_steps", "device")}
     stacks = [{"name": f"{variant}-{chunk[0]}-{chunk[-1]}", "variant": variant, "seeds": chunk, **common, **options,
                "agent": sweep["agent"] | options.get("agent", {})}
               for variant, options in sweep["variants"].items() for chunk in chunks(seeds, sweep["stack"])]
+    stacks.sort(key=lambda settings: settings["seeds"][0])
     return [*stacks, {"name": f"mini-batch-{seeds}", "variant": "mini-batch", "seeds": list(range(seeds)),
                       **sweep["mini_batch"]}]
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
     """Explore, train, and record the critic of the first seed; or sample a mini-batch."""
-    model = make("pbcs/Maze-v0", {"size": settings["size"], "wall_penalty": -1.0, "terminate_on_success": False})
+    model = make("pbcs/Maze-v0", MAZE | {"size": settings["size"]} | settings.get("maze", {}))
     if settings["variant"] == "mini-batch":
         return settings | _mini_batches(model, settings["seeds"], settings["explored"], settings["count"])
     agent, curves = _trained(model, settings, settings["seeds"], settings["steps"])
@@ -88,8 +91,37 @@ def _offline(agent: StackedAgent, model: ResettableModel, settings: dict[str, An
 def _with_rollouts(agent: StackedAgent, model: ResettableModel, settings: dict[str, Any], steps: int) -> dict[str, Any]:
     loop = LoopSettings(steps, episode_steps=settings["episode_steps"],
                         evaluate_every=settings["evaluate_every"])
-    curves = StackedTraining(model, agent, EpsilonGreedy(0.1), loop).run()
-    return {"at": curves.steps, "success": np.array(curves.success).astype(int).tolist()}
+    curves = StackedTraining(model, agent, EpsilonGreedy(0.1), loop, observers={
+        "wall_hits": _share_of_wall_hits, "wall_value": _value_below_the_wall,
+        "goal_value": lambda agent: _value_in_the_goal(agent, model)}).run()
+    return {"at": curves.steps, "success": np.array(curves.success).astype(int).tolist(),
+            "observed": {name: np.array(rows).round(4).tolist() for name, rows in curves.observed.items()}}
+
+
+def _share_of_wall_hits(agent: StackedAgent) -> Array:
+    """Return which share of the replay buffer has hit a wall, and so the expected share in mini-batches (4.6) [S]."""
+    rewards = agent.replay.state_dict()["rows"][..., 2 * len(agent.action_low)]  # observations are as wide as actions
+    share: Array = (rewards < 0.0).sum(axis=1) / np.maximum(1, agent.replay.sizes)
+    return share
+
+
+def _value_below_the_wall(agent: StackedAgent) -> Array:
+    """Return the mean of Q for going straight up from just below the inner wall of the 2x2 maze [S]."""
+    states = np.stack([np.linspace(0.1, 0.9, 9), np.full(9, 1.0 - HALF_WALL - 0.02)], axis=1)
+    return _values(agent, states, np.tile([0.0, agent.action_high[1]], (9, 1)))
+
+
+def _value_in_the_goal(agent: StackedAgent, model: ResettableModel) -> Array:
+    """Return Q in the middle of the goal for standing still [S]."""
+    assert model.goal_circle is not None
+    return _values(agent, np.array([model.goal_circle[:2]]), np.zeros((1, 2)))
+
+
+def _values(agent: StackedAgent, states: Array, actions: Array) -> Array:
+    """Return the mean of Q over states and actions [B, ...] that are their own observations [S]."""
+    seeds = len(agent.seeds)
+    mean: Array = agent.value(*(np.repeat(one[None], seeds, axis=0) for one in (states, actions))).mean(axis=1)
+    return mean
 
 
 def _picture(agent: StackedAgent, model: ResettableModel, steps: int) -> dict[str, Any]:

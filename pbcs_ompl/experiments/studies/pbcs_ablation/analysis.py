@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.experiments.claims import Claim, greater, higher, no_higher, rate
-from pbcs_ompl.figures.by_group import rates_figure, values_figure
-from pbcs_ompl.figures.canvas import publish
+from pbcs_ompl.figures.by_group import draw_rates, draw_values
+from pbcs_ompl.figures.canvas import new_panels, publish
 
 Records = list[dict[str, Any]]
 SOURCE = "[Matheron2020] 7.5"
@@ -18,8 +18,7 @@ def analyse(records: Records, figures: Path) -> list[Claim]:
     """Draw rates, transitions and skills for each value of each parameter; check what the thesis expects of them."""
     if not records:
         return []
-    for parameter in NAMES:
-        _draw(records, parameter, figures)
+    _draw(records, figures)
     return [*_alpha(records), *_beta(records), *_radius(records)]
 
 
@@ -95,18 +94,26 @@ def _radius(records: Records) -> list[Claim]:
                   ours)]
 
 
-def _draw(records: Records, parameter: str, figures: Path) -> None:
-    sizes = sorted({record["size"] for record in records})
+def _draw(records: Records, figures: Path) -> None:
+    """Draw a row of panels for each parameter: solved runs, transitions, skills."""
+    figure, panels = new_panels(len(NAMES), 3, 12.6, 3.4 * len(NAMES))
+    for row, parameter in enumerate(NAMES):
+        rates, *values = panels[3 * row:3 * row + 3]
+        groups = _by_size_and_value(records, parameter)
+        draw_rates(rates, {size: {value: (sum(r["solved"] for r in runs), len(runs)) for value, runs in columns.items()}
+                           for size, columns in groups.items()})
+        for axes, (key, label) in zip(values, (("train_transitions", "training transitions"), ("skills", "skills")),
+                                      strict=True):
+            draw_values(axes, {size: {value: [r[key] for r in runs] for value, runs in columns.items()}
+                               for size, columns in groups.items()}, ylabel=label, log=key != "skills")
+        for axes in (rates, *values):
+            axes.set_xlabel(f"{NAMES[parameter]}, usually {_usual(records, parameter):g}")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    figure.suptitle("PBCS without verification, one parameter changed (7.5)", fontsize=10)
+    publish(figure, figures / "parameters.png")
+
+
+def _by_size_and_value(records: Records, parameter: str) -> dict[str, dict[str, Records]]:
     swept = _swept(records, parameter)
-    groups = {f"{size}x{size}": {f"{value:g}": [r for r in runs if r["size"] == size] for value, runs in swept.items()}
-              for size in sizes}
-    name = NAMES[parameter]
-    publish(rates_figure({size: {value: (sum(r["solved"] for r in runs), len(runs)) for value, runs in values.items()}
-                       for size, values in groups.items()}, xlabel=name,
-                      title=f"Solved by PBCS without verification, usual {name} {_usual(records, parameter):g}"),
-         figures / f"{parameter}-solved.png")
-    for key, label in (("train_transitions", "training transitions"), ("skills", "skills")):
-        columns = {size: {value: [r[key] for r in runs] for value, runs in values.items()}
-                   for size, values in groups.items()}
-        publish(values_figure(columns, xlabel=name, ylabel=label, log=key != "skills", title=f"{label.capitalize()}"),
-             figures / f"{parameter}-{key.replace('_', '-')}.png")
+    return {f"{size}x{size}": {f"{value:g}": [r for r in runs if r["size"] == size] for value, runs in swept.items()}
+            for size in sorted({record["size"] for record in records})}

@@ -20,6 +20,6 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
     """Train once."""
     size, seed = settings["size"], settings["seed"]
     kwargs = {"size": size} | ({"maze_seed": seed} if size > 3 else {})
-    record, _ = trained("pbcs/Maze-v0", kwargs, seed=seed, preset=settings["preset"],
+    record, _ = trained("pbcs/Maze-v0", kwargs, method="pbcs", planner="Ex", seed=seed, preset=settings["preset"],
                         settings=settings["settings"] | settings["point"], max_transitions=settings["max_transitions"])
     return settings | record

@@ -1,59 +1,105 @@
-"""What a preset costs and what it solves."""
+"""What each difference between the presets "thesis" and "fast" is worth."""
 
 from pathlib import Path
 from typing import Any
 
-from pbcs_ompl.experiments.claims import Claim, greater, higher, rate, sometimes
-from pbcs_ompl.figures.by_group import rates_figure, values_figure
+import numpy as np
+
+from pbcs_ompl.experiments.claims import Claim, greater, higher, never, rate, sometimes
+from pbcs_ompl.experiments.studies.presets.study import ALL_BUT, FIRST
+from pbcs_ompl.figures.by_row import rows_figure
 from pbcs_ompl.figures.canvas import publish
 
 Records = list[dict[str, Any]]
-FAST, THESIS = "fast", "thesis"
 OURS = 'ours: what the preset "fast" is for'
+LITERAL, SMALL = "as [Matheron2020]: Alg. 6 to 8", "Alg. 6 to 8 with networks of 64 units"
 
 
 def analyse(records: Records, figures: Path) -> list[Claim]:
-    """Draw rates, transitions and seconds; compare the presets seed by seed."""
-    if records:
-        _draw(records, figures)
-    fast, thesis = ({(r["size"], r["seed"]): r for r in records if r["preset"] == preset} for preset in (FAST, THESIS))
-    pairs = [(fast[key], thesis[key]) for key in sorted(fast.keys() & thesis.keys())]
-    return [_solves_more(pairs), _literal(pairs), *(_cheaper(pairs, key) for key in ("transitions", "cpu_seconds"))]
+    """Draw what PBCS solves and costs with the first k changes, and with all but one; say what each change is worth."""
+    if not records:
+        return []
+    changes = list(records[0]["changes"])
+    steps = [_of(records, FIRST, count) for count in range(len(changes) + 1)]
+    without = [*(_of(records, ALL_BUT, count) for count in range(1, len(changes))), steps[-2]]
+    names = [LITERAL, *(f"+ {name}" for name in changes)]
+    _draw(dict(zip(names, steps, strict=True)), "PBCS from the thesis to the preset fast (the last row)",
+          figures / "changes.png")
+    _draw({"fast": steps[-1], **{f"without: {name}": runs for name, runs in zip(changes, without, strict=True)}},
+          "PBCS, preset fast, without one of its differences from the thesis", figures / "without-one.png")
+    return [*_literal(steps[0], steps[-1]), *_small(steps[1]),
+            *(_saves(f"{name}: fewer transitions than with the changes before it alone", before, after)
+              for name, before, after in zip(changes, steps, steps[1:], strict=False)),
+            *(_saves(f'{name}: without it "fast" takes more transitions', runs, steps[-1])
+              for name, runs in zip(changes, without, strict=True))]
 
 
-def _solves_more(pairs: list[tuple[dict[str, Any], dict[str, Any]]]) -> Claim:
-    one, other = (rate(sum(pair[side]["solved"] for pair in pairs), len(pairs)) for side in (0, 1))
-    return higher('within the same budget "fast" solves more mazes than "thesis"', one, other, (FAST, THESIS), OURS)
+def _of(records: Records, kind: str, count: int) -> Records:
+    return [record for record in records if (record["kind"], record["count"]) == (kind, count)]
 
 
-def _literal(pairs: list[tuple[dict[str, Any], dict[str, Any]]]) -> Claim:
-    runs = [thesis for _, thesis in pairs]
-    small = [run for run in runs if run["size"] == 2]
-    solved = rate(sum(run["solved"] for run in small), len(small))
-    return (sometimes('the settings of the thesis solve some 2x2 mazes within the budget', "2x2", solved,
-                      "[Matheron2020] 7.4, which gives no budget")
-            .with_numbers(**{"3x3": rate(sum(run["solved"] for run in runs) - solved["successes"],
-                                         len(runs) - len(small)),
-                             "covered, where the budget ended": [run["reason"] for run in runs
-                                                                 if not run["complete"]]}))
+def _solved(records: Records, *sizes: int) -> dict[str, Any]:
+    chosen = [record for record in records if not sizes or record["size"] in sizes]
+    return rate(sum(record["solved"] for record in chosen), len(chosen))
 
 
-def _cheaper(pairs: list[tuple[dict[str, Any], dict[str, Any]]], key: str) -> Claim:
-    fast, thesis = ({index: float(pair[side][key]) for index, pair in enumerate(pairs)} for side in (0, 1))
-    words = {"transitions": "transitions", "cpu_seconds": "seconds of a core"}[key]
-    return greater(f'"thesis" uses more {words} than "fast", solved or not', thesis, fast, (THESIS, FAST), OURS)
+def _sizes(records: Records) -> list[int]:
+    return sorted({record["size"] for record in records})
 
 
-def _draw(records: Records, figures: Path) -> None:
-    presets = list(dict.fromkeys(record["preset"] for record in records))
-    sizes = sorted({record["size"] for record in records})
-    groups = {preset: {f"{size}x{size}": [r for r in records if (r["preset"], r["size"]) == (preset, size)]
-                       for size in sizes} for preset in presets}
-    budget = max(record["max_transitions"] for record in records)
-    publish(rates_figure({preset: {size: (sum(r["solved"] for r in runs), len(runs)) for size, runs in columns.items()}
-                       for preset, columns in groups.items()}, title=f"Solved within {budget:,} transitions"),
-         figures / "solved.png")
-    for key, label in (("transitions", "transitions, solved or not"), ("cpu_seconds", "seconds of a core")):
-        publish(values_figure({preset: {size: [r[key] for r in runs] for size, runs in columns.items()}
-                            for preset, columns in groups.items()}, ylabel=label, log=True,
-                           title="What a training costs"), figures / f"{key.replace('_', '-')}.png")
+def _by_size(records: Records) -> dict[str, Any]:
+    return {f"{size}x{size}": _solved(records, size) for size in _sizes(records)}
+
+
+def _literal(thesis: Records, fast: Records) -> list[Claim]:
+    keys = {(record["size"], record["seed"]) for record in thesis}
+    same = [record for record in fast if (record["size"], record["seed"]) in keys]
+    return [higher('within the same budget "fast" solves more mazes than "thesis"', _solved(same), _solved(thesis),
+                   ("fast", "thesis"), OURS).with_numbers(**_by_size(thesis)),
+            sometimes('the preset "thesis" solves some 2x2 mazes within the budget', "2x2", _solved(thesis, 2),
+                      "[Matheron2020] 7.4, which gives no budget").with_numbers(**_ends(thesis))]
+
+
+def _small(runs: Records) -> list[Claim]:
+    """What the algorithm of the thesis does with networks that are small enough to be tried in all mazes."""
+    large = [record for record in runs if record["size"] > 2]
+    return [never(f"{SMALL} solve no maze from 3x3 on within the budget", "solved", _solved(large),
+                  "ours: the thesis reports 15x15 with chains of such skills, without a budget")
+            .with_numbers(**_by_size(runs), **_ends(runs))]
+
+
+def _ends(runs: Records) -> dict[str, Any]:
+    """Return how much of the plan is covered at the end, and how many chains are complete but fail with noise."""
+    covered = {f"{size}x{size}": round(float(np.median([r["covered"] for r in runs if r["size"] == size])), 3)
+               for size in _sizes(runs)}
+    failing = sum(r["complete"] and not r["solved"] for r in runs)
+    return {"covered, median": covered, "complete, but not solved": failing}
+
+
+def _saves(claim: str, more: Records, less: Records) -> Claim:
+    """Claim that the first runs took more transitions than the second, maze by maze and seed by seed.
+
+    An unsolved run counts as one that took the whole budget.
+    """
+    one, other = ({(r["size"], r["seed"]): _cost(r) for r in runs} for runs in (more, less))
+    return (greater(claim, one, other, ("without", "with"), OURS)
+            .with_numbers(solved_without=_solved(more), solved_with=_solved(less), **_by_size(less)))
+
+
+def _cost(record: dict[str, Any]) -> float:
+    return float(record["transitions"] if record["solved"] else record["max_transitions"])
+
+
+def _draw(rows: dict[str, Records], title: str, path: Path) -> None:
+    sizes = sorted({record["size"] for runs in rows.values() for record in runs})
+    groups = {f"{size}x{size}": {row: [r for r in runs if r["size"] == size] for row, runs in rows.items()}
+              for size in sizes}
+    budget = max(record["max_transitions"] for runs in rows.values() for record in runs)
+    publish(rows_figure(
+        {"share of solved runs": {size: {row: (sum(r["solved"] for r in runs), len(runs)) for row, runs in one.items()}
+                                  for size, one in groups.items()}},
+        {"covered part of the plan": {size: {row: [r["covered"] for r in runs] for row, runs in one.items()}
+                                      for size, one in groups.items()},
+         "transitions of solved runs, thousands": {
+             size: {row: [r["transitions"] / 1000 for r in runs if r["solved"]] for row, runs in one.items()}
+             for size, one in groups.items()}}, title=f"{title}; at most {budget:,} transitions"), path)

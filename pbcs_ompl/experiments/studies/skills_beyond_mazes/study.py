@@ -19,6 +19,6 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
 def run(settings: dict[str, Any]) -> dict[str, Any]:
     """Train once; record what it cost and whether the chain succeeds."""
     options = {key: settings[key] for key in ("planner_kwargs", "preset", "settings", "seed", "max_transitions")}
-    record, result = trained(settings["env"], settings["env_kwargs"], **options)
+    record, result = trained(settings["env"], settings["env_kwargs"], method="pbcs", planner="Ex", **options)
     length = None if result.trajectory is None else result.trajectory.length
     return settings | {key: record[key] for key in KEPT} | {"path_length": length}

@@ -7,8 +7,9 @@ import numpy as np
 
 from pbcs_ompl.core.statistics import median_interval
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.experiments.claims import Claim, greater
-from pbcs_ompl.experiments.studies.tree_pitfalls.study import MEASURES
+from pbcs_ompl.experiments.claims import Claim, greater, rate
+from pbcs_ompl.experiments.studies.tree_pitfalls.study import EST_RULES, MEASURES
+from pbcs_ompl.figures.by_group import values_figure
 from pbcs_ompl.figures.canvas import BAND, new_panels, publish
 
 Records = list[dict[str, Any]]
@@ -21,10 +22,13 @@ DEEPER = 3.0
 def analyse(records: Records, figures: Path) -> list[Claim]:
     """Draw depths and seconds by the size of the tree; check what the thesis says of them."""
     kinds = {kind: [record for record in records if record["kind"] == kind]
-             for kind in ("paradox", "neighbours", "growth")}
+             for kind in ("paradox", "neighbours", "growth", "est")}
     if kinds["neighbours"] and kinds["growth"]:
         _draw(kinds["neighbours"], kinds["growth"], figures)
-    return [*_paradox(kinds["paradox"]), *_neighbours(kinds["neighbours"]), *_growth(kinds["growth"])]
+    if kinds["est"]:
+        _draw_est(kinds["est"], figures)
+    return [*_paradox(kinds["paradox"]), *_neighbours(kinds["neighbours"]), *_growth(kinds["growth"]),
+            *_est(kinds["est"])]
 
 
 def _by_seed(records: Records, number: Any) -> dict[int, float]:
@@ -70,6 +74,26 @@ def _growth(records: Records) -> list[Claim]:
             claims.append(greater("one of RRT-NH takes longer in the largest tree than in the smallest", late, early,
                                   ("largest, s", "smallest, s"), "[Matheron2020] 3.3.2"))
     return claims
+
+
+def _est(records: Records) -> list[Claim]:
+    """Compare the rule of the text of 3.2 with that of its figure; an unsolved run counts as the whole budget."""
+    costs = {rule: {(r["size"], r["seed"]): float(r["transitions"] if r["solved"] else r["max_transitions"])
+                    for r in records if r["rule"] == rule} for rule in EST_RULES}
+    solved = {f"solved, {rule}": rate(sum(r["solved"] for r in records if r["rule"] == rule),
+                                      len(costs[rule])) for rule in EST_RULES}
+    return [greater("EST needs more transitions when it draws nodes by 1 / omega than when it takes one with the "
+                    "least omega", costs["draw"], costs["least"], ("draw", "least"),
+                    "[Matheron2020] 3.2: its text and Fig. 3.5 contradict each other").with_numbers(**solved)]
+
+
+def _draw_est(records: Records, figures: Path) -> None:
+    groups = {f"EST, {rule}": {f"{size}x{size}": [r["transitions"] for r in records
+                                                  if (r["rule"], r["size"]) == (rule, size) and r["solved"]]
+                               for size in sorted({r["size"] for r in records})} for rule in EST_RULES}
+    publish(values_figure(groups, ylabel="transitions to the goal", log=True,
+                          title="EST's two rules: a node drawn by 1 / ω, or one with the least ω (3.2)"),
+            figures / "est-rules.png")
 
 
 def _draw(neighbours: Records, growth: Records, figures: Path) -> None:

@@ -15,6 +15,9 @@ BOX = "pbcs/Box-v0"
 MEASURES = ("nodes nearby", "edges that leave nodes nearby")
 """Of the density around a node: what leads to the paradox, and that of Ex ([Matheron2020] 3.3.1, third approach)."""
 
+EST_RULES = ("draw", "least")
+"""Options of ESTAdapted: the rules of Fig. 3.5 and of the text of 3.2."""
+
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
     """One run of each kind for each seed."""
@@ -22,6 +25,8 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
     kinds += [{"kind": "neighbours", **sweep["neighbours"]}]
     kinds += [{"kind": "growth", "planner": planner, "sizes": sweep["growth"]["sizes"]}
               for planner in sweep["growth"]["planners"]]
+    kinds += [{"kind": "est", "rule": rule, "size": size, "max_transitions": sweep["est"]["max_transitions"]}
+              for size in sweep["est"]["sizes"] for rule in EST_RULES]
     return [{"name": f"{kind['kind']}-{index}-{seed}", "seed": seed, **kind}
             for seed in range(seeds) for index, kind in enumerate(kinds)]
 
@@ -29,8 +34,8 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
 def run(settings: dict[str, Any]) -> dict[str, Any]:
     """Do what the kind of the run says."""
     rng = np.random.default_rng(settings["seed"])
-    found = {"paradox": _paradox, "neighbours": _neighbours, "growth": _growth}[settings["kind"]](settings, rng)
-    return settings | found
+    kinds = {"paradox": _paradox, "neighbours": _neighbours, "growth": _growth, "est": _est}
+    return settings | kinds[settings["kind"]](settings, rng)
 
 
 def _paradox(settings: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
@@ -91,3 +96,12 @@ def _growth(settings: dict[str, Any], rng: np.random.Generator) -> dict[str, Any
         plan(model, settings["planner"], seed=settings["seed"], max_transitions=size)
         spent.append(time.process_time() - began)
     return {"seconds": spent}
+
+
+def _est(settings: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """Return how many transitions EST needs in a maze with one of the two rules of [Matheron2020] 3.2."""
+    size, seed = settings["size"], settings["seed"]
+    maze = {"size": size} | ({"maze_seed": seed} if size > 3 else {})
+    found = plan("pbcs/Maze-v0", "ESTAdapted", env_kwargs=maze, planner_kwargs={"rule": settings["rule"], "batch": 1},
+                 seed=seed, max_transitions=settings["max_transitions"])
+    return {"solved": found.solved, "transitions": found.transitions}
