@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,12 +13,11 @@ from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.follower import Progress, Relay
 from pbcs_ompl.skills.path_following.task import LOOKS, FollowTask, LineSettings, Position
+from pbcs_ompl.skills.path_following.verdict import Trouble, Verdict, judged
 from pbcs_ompl.skills.sequential_test import SequentialTest
 from pbcs_ompl.skills.settings import AgentSpaces, PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
 
-FIRST_TRIALS, MOST_TRIALS = 4, 8
-"""Noisy executions of a test side by side before the sequential test is asked: first, and later."""
 SHORTEST_SESSION = 250
 """Transitions of a session along a short line."""
 
@@ -85,14 +84,6 @@ class Member(NamedTuple):
     policy: Policy
 
 
-class Verdict(NamedTuple):
-    """The result of a test: whether the policy passed, its success rate with noise, where its failures ended."""
-
-    passed: bool
-    rate: float
-    blocked: int
-
-
 @dataclass
 class FollowState:
     """The variables of the loop.
@@ -117,24 +108,6 @@ class FollowState:
     candidate: int = 0
     passed: bool = False
     rounds: int = 0
-
-
-@dataclass(frozen=True, eq=False)
-class Trouble:
-    """Where executions of a refused test failed.
-
-    Attributes:
-        before: Where they were shortly before [F].
-        ends: The pointers at which they came to their ends [F].
-    """
-
-    before: Position
-    ends: IndexArray
-
-    @classmethod
-    def together(cls, troubles: Sequence["Trouble"]) -> Self:
-        """Return several as one."""
-        return cls(Position.together([one.before for one in troubles]), np.concatenate([one.ends for one in troubles]))
 
 
 class Follow:
@@ -346,24 +319,11 @@ class Follow:
         return verdict
 
     def _executed(self, relay: Relay, starts: Position, until: IndexArray) -> tuple[Verdict, Trouble]:
-        """Return the verdict of the gate on noisy executions, and where they failed.
+        """Return the verdict on noisy executions from starts [N] to pointers [N], in turn, and where they failed."""
+        def failures(chosen: IndexArray) -> Trouble:
+            return self._failures(relay, starts[chosen], until[chosen], self.trainer.settings.test_epsilon)
 
-        Args:
-            relay: The policies.
-            starts: Where executions begin, in turn [N].
-            until: The pointers at which they end; beyond the line, at the goal [N].
-        """
-        gate, failures = self.settings.gate, list[Trouble]()
-        trials, failed, passed = 0, 0, None
-        while passed is None:
-            count = min(MOST_TRIALS if trials else FIRST_TRIALS, gate.most_needed(trials - failed, trials))
-            chosen = (trials + np.arange(count)) % len(until)
-            failures.append(self._failures(relay, starts[chosen], until[chosen], self.trainer.settings.test_epsilon))
-            trials += count
-            failed += len(failures[-1].ends)
-            passed = gate.verdict(trials - failed, trials)
-        trouble = Trouble.together(failures)
-        return Verdict(passed, 1.0 - failed / trials, int(trouble.ends.max(initial=0))), trouble
+        return judged(self.settings.gate, len(until), failures)
 
     def _failures(self, relay: Relay, starts: Position, until: IndexArray, epsilon: float) -> Trouble:
         """Return where executions from some starts [N] fail; training begins there from now on."""

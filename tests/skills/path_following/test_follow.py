@@ -18,9 +18,10 @@ from pbcs_ompl.skills import load_chain, method_settings
 from pbcs_ompl.skills.agent_interface import load_agent
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
-from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings, Trouble, Verdict
+from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings
 from pbcs_ompl.skills.path_following.follower import Progress, Relay
 from pbcs_ompl.skills.path_following.task import FollowTask, LineSettings, Position, around_last_progress, extended
+from pbcs_ompl.skills.path_following.verdict import Trouble, Verdict
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
 
@@ -283,7 +284,8 @@ def test_a_refused_policy_is_trained_where_it_failed(plan: Trajectory) -> None:
     assert following._retries is None
     start = following.task.at(np.array([0]))[np.zeros(3, dtype=np.int64)]
     beyond = np.full(3, following.task.line.last + 1)
-    found = following._failures(Relay([following._present()], [0]), start, beyond, 0.0)
+    still = replace(following._present(), action_low=np.zeros(2), action_high=np.zeros(2))
+    found = following._failures(Relay([still], [0]), start, beyond, 0.0)
     assert len(found.before.states) == len(found.ends) == 3
     assert following._retries is not None
     places = {tuple(state) for state in following._retries.states}
@@ -296,14 +298,14 @@ def test_a_refused_policy_is_trained_where_it_failed(plan: Trajectory) -> None:
 
 def test_a_policy_is_refused_where_the_last_one_failed_without_an_execution_of_the_whole_line(
         plan: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Executions fail in the middle of the line until `mended`."""
+    """Executions fail in the middle of the line until `learnt`."""
     following = method(plan.states)
-    task, begun, mended = following.task, list[int](), [False]
+    task, begun, learnt = following.task, list[int](), [False]
     middle = task.line.last // 2
 
     def failures(self: Follow, relay: Relay, starts: Position, until: np.ndarray, epsilon: float) -> Trouble:
         begun.extend(starts.progress.pointers.tolist())
-        fail = (until > middle) & (not mended[0]) & (epsilon > 0)
+        fail = (until > middle) & (not learnt[0]) & (epsilon > 0)
         shortly_before = task.at(np.full(fail.sum(), task.place(middle - 5)))
         return Trouble(shortly_before, np.full(fail.sum(), middle))
 
@@ -317,7 +319,7 @@ def test_a_policy_is_refused_where_the_last_one_failed_without_an_execution_of_t
     restored = method(plan.states)
     restored.restore(following.snapshot())
     begun.clear()
-    mended[0] = True
+    learnt[0] = True
     assert restored._try(following._present(), 0).passed
     assert {0, task.pointers[task.place(middle - 5)]} == set(begun)
 
