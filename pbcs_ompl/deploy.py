@@ -247,11 +247,9 @@ class _Follower:
 
     def __init__(self, words: Words, arrays: Arrays):
         self.line: Array = arrays.get("line", np.empty((0, 2)))
-        self._distances, self._firsts = arrays["distances"], arrays["firsts"]
-        self._entries, self._unit = arrays["entries"], arrays["unit"]
-        self._origin, self._scale = arrays["origin"], arrays["scale"]
-        self._patience = words["patience"]
-        self._reach = np.arange(words["reach"] + 1)
+        self._distances, self._firsts, self._entries = arrays["distances"], arrays["firsts"], arrays["entries"]
+        self._unit, self._origin, self._scale = arrays["unit"], arrays["origin"], arrays["scale"]
+        self._patience, self._reach = words["patience"], np.arange(words["reach"] + 1)
         self._pass_radius = arrays.get("pass_radius", np.inf)  # of older files
 
     def step(self, observations: Array, memory: Memory) -> Step:
@@ -277,12 +275,10 @@ class _Follower:
 
     def _ahead(self, places: Array, pointer: Indices) -> Array:
         """Return the points of the line at the distances ahead, relative to where the episodes are [B, K, F]."""
-        ahead: Array = self.line[np.minimum(pointer[:, None] + self._distances, len(self.line) - 1)] - places[:, None]
-        return ahead
+        return np.asarray(self.line[np.minimum(pointer[:, None] + self._distances, len(self.line) - 1)] - places[:, None])
 
     def _stalled(self, memory: Memory) -> Array:
-        share: Array = np.minimum(memory["stalled"][:, None] / self._patience, 1.0)
-        return share
+        return np.asarray(np.minimum(memory["stalled"][:, None] / self._patience, 1.0))
 
 
 class _RobotFollower(_Follower):
