@@ -266,16 +266,16 @@ class _Follower:
         pointer, stalled = memory["pointer"], memory["stalled"]
         candidates = np.minimum(pointer[:, None] + self._reach, len(self.line) - 1)
         squares = np.add.reduce((self.line[candidates] - places[:, None]) ** 2, axis=2)
-        if self._pass_radius < np.inf:
-            barred = (squares[:, 1:] > squares[:, :-1]) & (squares[:, 1:] > self._pass_radius ** 2)
-            squares[:, 1:][np.logical_or.accumulate(barred, axis=1)] = np.inf
+        barred = (squares[:, 1:] > squares[:, :-1]) & (squares[:, 1:] > self._pass_radius ** 2)
+        squares[:, 1:][np.logical_or.accumulate(barred, axis=1)] = np.inf
         moved = candidates[np.arange(len(places)), squares.argmin(axis=1)]
         stalled[:] = np.where(moved > pointer, 0, stalled + 1)
         pointer[:] = moved
 
     def _ahead(self, places: Array, pointer: Indices) -> Array:
         """Return the points of the line at the distances ahead, relative to where the episodes are [B, K, F]."""
-        return np.asarray(self.line[np.minimum(pointer[:, None] + self._distances, len(self.line) - 1)] - places[:, None])
+        shown = np.minimum(pointer[:, None] + self._distances, len(self.line) - 1)
+        return np.asarray(self.line[shown] - places[:, None])
 
     def _stalled(self, memory: Memory) -> Array:
         return np.asarray(np.minimum(memory["stalled"][:, None] / self._patience, 1.0))
