@@ -41,16 +41,16 @@ class GridStrategy(Strategy):
         """Add motions in compiled code (see `pbcs_ompl.planners.compiled`)."""
         tree.reserve(count)
         self._reserve(count)
-        loop, memory = self._compiled()
+        loop, kept = self._compiled()
         written, reached = loop(step.parameters, feature_dims, bounds_of(self.context),
-                                self.context.control_durations, tree.columns, len(tree), count, self._grid, memory,
+                                self.context.control_durations, tree.columns, len(tree), count, self._grid, kept,
                                 self._size, self.rng)
         tree.claim(written)
         return len(tree) - 1 if reached else -1
 
     @abstractmethod
     def _compiled(self) -> tuple[Any, Any]:
-        """Return the compiled loop, and what it remembers of the cells."""
+        """Return the compiled loop, and what it keeps of the cells beside the grid."""
 
     @abstractmethod
     def _reserve(self, count: int) -> None:
