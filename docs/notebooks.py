@@ -1,6 +1,7 @@
 """The tutorials as notebooks: `make notebooks` writes and executes docs/_build/notebooks/*.ipynb.
 
-The pages are the source: each block of Python is a cell, and so is each block of commands. Jupyter starts in the folder of the notebook.
+The pages are the source: each block of Python is a cell, and so is each block of commands. Jupyter starts in the
+folder of the notebook.
 """
 
 import os

@@ -162,9 +162,9 @@ def _plan(verb: Parser) -> None:
 def _train(verb: Parser) -> None:
     """plan a trajectory, then train a chain of skills along it"""
     _add_environment(verb, required=False)
-    verb.add_argument("--method", metavar="NAME",
-                      help="pbcs, follow, pb, backplay, plain, bootstrapped or offline (that of the preset)")
-    _add_planner(verb, None, "that of the preset, or none beside --path")
+    verb.add_argument("--method", default="pbcs", metavar="NAME",
+                      help="pbcs, follow, pb, backplay, plain, bootstrapped or offline (pbcs)")
+    _add_planner(verb, None, "Ex, of follow Rides; none beside --path")
     verb.add_argument("--agent", default="ddpg", metavar="NAME", help="registered, or module:Class (ddpg)")
     verb.add_argument("--device", default="cpu", metavar="NAME", help="where the agent learns: cpu or cuda (cpu)")
     verb.add_argument("--preset", default="fast", metavar="NAME",
@@ -304,7 +304,7 @@ def _agents(verb: Parser) -> None:
 def _settings(verb: Parser) -> None:
     """list the settings of a preset for a training method, and what they mean"""
     verb.add_argument("preset", nargs="?", default="fast", metavar="PRESET", help="fast or thesis (fast)")
-    verb.add_argument("--method", metavar="NAME", help="the training method (that of the preset)")
+    verb.add_argument("--method", default="pbcs", metavar="NAME", help="the training method (pbcs)")
 
 
 def _demo(verb: Parser) -> None:

@@ -45,8 +45,7 @@ def run(arguments: Namespace) -> int:
             raise InvalidOption("--worlds goes with --lines random")
         if arguments.env is None:
             raise InvalidOption("--env is missing (see pbcs train --help)")
-        named = [] if arguments.method is None else [arguments.method]
-        out = Path(arguments.out or fresh_folder("train", arguments.env, *named, arguments.seed))
+        out = Path(arguments.out or fresh_folder("train", arguments.env, arguments.method, arguments.seed))
     try:
         result = _train(arguments, out)
     except KeyboardInterrupt as error:

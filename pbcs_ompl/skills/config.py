@@ -22,7 +22,7 @@ from pbcs_ompl.skills.agent_interface import Agent, AgentSettingsValues, load_ag
 from pbcs_ompl.skills.method import TrainingMethod
 from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings
 from pbcs_ompl.skills.pbcs import PBCS, PBCSSettings
-from pbcs_ompl.skills.settings import PRESET_VALUES, MethodSettings, PlannedSettings, flat_names, read_preset
+from pbcs_ompl.skills.settings import MethodSettings, PlannedSettings, flat_names, read_preset
 from pbcs_ompl.skills.single_policy import (
     PB,
     BackplaySettings,
@@ -38,10 +38,11 @@ from pbcs_ompl.skills.trainer import SkillTrainer
 
 
 class MethodEntry(NamedTuple):
-    """A training method, and the type of its settings."""
+    """A training method, the type of its settings, and the planner whose plans it trains along unless one is named."""
 
     build: Callable[[SkillTrainer, Any], TrainingMethod]
     settings: type[MethodSettings]
+    planner: str = "Ex"
 
     @property
     def needs_plan(self) -> bool:
@@ -53,7 +54,7 @@ METHODS: dict[str, MethodEntry] = {
     "pbcs": MethodEntry(PBCS, PBCSSettings),
     "pb": MethodEntry(PB, PBSettings),
     "backplay": MethodEntry(SlidingWindow, BackplaySettings),
-    "follow": MethodEntry(Follow, FollowSettings),
+    "follow": MethodEntry(Follow, FollowSettings, "Rides"),
     "plain": MethodEntry(Plain, PlainSettings),
     "bootstrapped": MethodEntry(Bootstrapped, OfflineSettings),
     "offline": MethodEntry(Offline, OfflineSettings),
@@ -84,7 +85,7 @@ def method_settings(method: str, preset: str = "fast", changes: Mapping[str, Any
         InvalidOption: the method has no such setting, or a value of the wrong type or out of its range.
     """
     entry, tables = find_method(method), read_preset(preset)
-    check_names(f"preset {preset!r}", "table", tables.keys() - PRESET_VALUES, {"common", *METHODS})
+    check_names(f"preset {preset!r}", "table", tables.keys() - {"version"}, {"common", *METHODS})
     _check_settings(method, flat_names(changes or {}))
     defaults = entry.settings().updated(tables.get("common", {}) | tables.get(method, {}))
     return defaults.updated(changes or {})
@@ -143,7 +144,7 @@ class TrainConfig:
         choose_device(self.device)
 
     @classmethod
-    def resolve(cls, *, method: str | None, planner: str | None, planner_kwargs: Mapping[str, Any] | None, agent: str,
+    def resolve(cls, *, method: str, planner: str | None, planner_kwargs: Mapping[str, Any] | None, agent: str,
                 preset: str, settings: Mapping[str, Any] | None, agent_settings: Mapping[str, Any] | None, seed: int,
                 max_transitions: int, device: str, planned: bool) -> "TrainConfig":
         """Return the configuration that these choices of `train` stand for.
@@ -154,9 +155,8 @@ class TrainConfig:
         Raises:
             UnknownName, InvalidOption: see the class; also a planner or a trajectory that is not used.
         """
-        usual = read_preset(preset)
-        method = usual["method"] if method is None else method
-        needs_plan = find_method(method).needs_plan
+        entry = find_method(method)
+        needs_plan = entry.needs_plan
         if not needs_plan and (planned or planner is not None or planner_kwargs):
             raise InvalidOption(f"method {method!r} trains without a plan; remove trajectory, planner and "
                                 "planner_kwargs, or choose from "
@@ -164,10 +164,10 @@ class TrainConfig:
         if planned and (planner is not None or planner_kwargs):
             raise InvalidOption("a trajectory is given, so nothing is planned; remove planner and planner_kwargs")
         chosen = load_agent(agent).settings_type.from_preset(preset, **(agent_settings or {}))
-        versions = {"skills": int(usual["version"])}
+        versions = {"skills": int(read_preset(preset)["version"])}
         if isinstance(chosen, AgentSettings):
             versions["agent"] = preset_version(preset)
-        used = (planner or usual["planner"]) if needs_plan and not planned else None
+        used = (planner or entry.planner) if needs_plan and not planned else None
         return cls(method, used, dict(planner_kwargs or {}), agent, preset, versions,
                    method_settings(method, preset, settings), chosen, seed, max_transitions, device)
 

@@ -258,13 +258,9 @@ def preset_names() -> list[str]:
                   if entry.name.endswith(".toml"))
 
 
-PRESET_VALUES = frozenset({"version", "method", "planner"})
-"""What a preset has beside tables: a number that grows when it changes, and the method and planner of a training."""
-
-
 @cache
 def read_preset(name: str) -> dict[str, Any]:
-    """Return the tables of a preset and its `PRESET_VALUES`.
+    """Return the tables of a preset and its "version", which grows whenever one of its values changes.
 
     Raises:
         UnknownName: no such preset; the message suggests the closest one.

@@ -22,12 +22,13 @@ from pbcs_ompl.results.checksums import changed_files
 from pbcs_ompl.results.files import CHECKPOINT, CONFIG, PLAN, RESULT, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.config import TrainConfig, read_config
-from pbcs_ompl.skills.training import Training, TrainResult, training_versions
+from pbcs_ompl.skills.train_result import TrainResult
+from pbcs_ompl.skills.training import Training, training_versions
 
 
 @checked
 def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: Trajectory | None = None,
-          method: str | None = None, agent: str = "ddpg", preset: str = "fast", settings: dict[str, Any] | None = None,
+          method: str = "pbcs", agent: str = "ddpg", preset: str = "fast", settings: dict[str, Any] | None = None,
           agent_settings: dict[str, Any] | None = None, planner: str | None = None,
           planner_kwargs: dict[str, Any] | None = None, env_kwargs: dict[str, Any] | None = None,
           goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
@@ -39,13 +40,14 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
     Args:
         env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model.
         trajectory: A plan made before.
-        method: "pbcs", "follow", "pb", "backplay", "plain", "bootstrapped" or "offline"; None for that of the preset.
+        method: "pbcs", "follow", "pb", "backplay", "plain", "bootstrapped" or "offline".
         agent: A registered agent, or module:Class.
         preset: Named settings of the method and of the agent: "fast" or "thesis".
         settings: Settings of the method that differ from the preset, by name ({"epsilon": 0.2}), by path
             ({"episodes.epsilon": 0.2}) or as tables.
         agent_settings: Settings of the agent that differ from the preset.
-        planner: A registered planner, or module:attribute; None for that of the preset, or where nothing is planned.
+        planner: A registered planner, or module:attribute; None for that of the method (Ex, of follow Rides), or where
+            nothing is planned.
         planner_kwargs: Options of the planner.
         env_kwargs: Options of the environment, when `env` is an id.
         goal, feature, start_seed, reset_options, max_episode_steps: See `pbcs_ompl.make`.

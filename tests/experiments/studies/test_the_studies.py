@@ -65,7 +65,8 @@ SMALL = {
     "control-duration": {"max_transitions": 5000, "control_durations": [1, 3],
                          "scenes": {"maze-2": {"env": "pbcs/Maze-v0", "env_kwargs": {"size": 2}}}},
 }
-SLOW = ("backplay-2x2", "deadlock", "exploration-trees", "half-cheetah-priming", "offline-vs-bootstrapped")
+SLOW = ("antmaze-exploration", "backplay-2x2", "closed-loop", "deadlock", "exploration-trees", "half-cheetah-priming",
+        "offline-vs-bootstrapped", "pbcs-ablation", "toy-analysis")
 
 
 SIMULATED = ("antmaze-exploration", "half-cheetah-priming")
