@@ -139,7 +139,8 @@ class _Improver:
         saved, spent = {self._pull: 1.0, self._cut: 1.0}, {self._pull: 1.0, self._cut: float(len(self._best) + 1)}
         try:
             with code_of_others():
-                self._learn()
+                if len(self._best) > 1:  # a tree without a transition shows nothing
+                    self._learn()
                 while len(self._best) > 1 and self._counter.left:
                     self._cut_short()
                     move = max(saved, key=lambda one: saved[one] / spent[one])
