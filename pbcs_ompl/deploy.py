@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Complex = NDArray[np.complex128]
 Arrays = dict[str, NDArray[Any]]
 Words = dict[str, Any]
 Memory = dict[str, Indices]
@@ -30,6 +31,8 @@ FORMAT = 1
 LAYER_NORM_EPSILON = 1e-5
 KEEP_SIDE = math.cos(math.pi / 3)
 """A side leads as long as the cosine of the angle between the line and its heading is at least this."""
+QUATERNION = np.array([3, 6, 4, 5])
+"""Where an observation with a free joint has the w, z, x and y of the quaternion."""
 LARGEST = 10.0
 """Bound of the inputs of a robot's network."""
 
@@ -52,23 +55,14 @@ def load(path: str | Path | None = None) -> "Controller":
     return Controller(words, arrays)
 
 
-def flat(observation: Any) -> Array:
-    """Return an observation as one vector: entries of dictionaries follow each other in the order of their names."""
-    if isinstance(observation, dict):
-        return np.concatenate([flat(observation[name]) for name in sorted(observation)])
-    if isinstance(observation, tuple):
-        return np.concatenate([flat(part) for part in observation])
-    return np.asarray(observation, dtype=np.float64).ravel()
-
-
-def _rows(observations: Any) -> Array:
-    """Return observations of several episodes as vectors [B, O]."""
+def _rows(observations: Any, single: bool) -> Array:
+    """Return observations of several episodes, or of one, as vectors [B, O]; dictionaries in the order of names."""
     if isinstance(observations, dict):
-        return np.concatenate([_rows(observations[name]) for name in sorted(observations)], axis=1)
+        observations = tuple(observations[name] for name in sorted(observations))
     if isinstance(observations, tuple):
-        return np.concatenate([_rows(part) for part in observations], axis=1)
+        return np.concatenate([_rows(part, single) for part in observations], axis=1)
     rows = np.asarray(observations, dtype=np.float64)
-    return rows.reshape(len(rows), -1)
+    return rows.reshape(1 if single else len(rows), -1)
 
 
 Step = tuple[Array, Indices, Indices | None]
@@ -129,12 +123,12 @@ class Controller:
         Raises:
             ValueError: the observation has another size, or there are more or fewer than episodes.
         """
-        observations = flat(observation)[None] if self._single else _rows(observation)
+        observations = _rows(observation, self._single)
         count = len(next(iter(self.memory.values())))
         expected = (count, len(self.words["observation"]))
         if observations.shape != expected:
-            raise ValueError(f"observations of the shape {observations.shape}; expected {expected}: "
-                             f"{', '.join(self.words['observation'])} for each of {count} episodes")
+            names = ", ".join(self.words["observation"])
+            raise ValueError(f"observations of the shape {observations.shape}; expected {expected}: {names}")
         inputs, chosen, side = self._kind.step(observations, self.memory)
         controls = self._networks.act(inputs, chosen)
         if side is not None and isinstance(self._kind, _RobotFollower):
@@ -147,14 +141,13 @@ class _Networks:
     """Networks of the same inputs: ReLU layers, a tanh, and an affine map onto the box of controls."""
 
     def __init__(self, arrays: Arrays, count: int):
-        self._low, self._half = arrays["low"], 0.5 * (arrays["high"] - arrays["low"])
-        self._high = arrays["high"]
+        self._low, self._high, self._half = arrays["low"], arrays["high"], 0.5 * (arrays["high"] - arrays["low"])
         self._networks = []
         for index in range(count):
             depth = sum(name.startswith(f"network{index}.weight") for name in arrays)
             names = [[f"network{index}.{part}_{layer}" for part in ("weight", "bias", "gain", "shift")]
                      for layer in range(depth)]
-            self._networks.append([[arrays[name] for name in layer if name in arrays] for layer in names])
+            self._networks.append([_layer([arrays[name] for name in layer if name in arrays]) for layer in names])
 
     def act(self, inputs: Array, chosen: Indices) -> Array:
         """Return the controls [B, A] of the networks `chosen` [B] for inputs [B, I]."""
@@ -173,12 +166,24 @@ class _Networks:
         for layer in hidden:
             values = values @ layer[0]
             values += layer[1]
-            if len(layer) == 4:
-                values -= values.mean(axis=1, keepdims=True)
-                values /= np.sqrt(np.square(values).mean(axis=1, keepdims=True) + LAYER_NORM_EPSILON)
-                values = values * layer[2] + layer[3]
+            if len(layer) == 5:
+                values /= np.sqrt(np.add.reduce(values * values, axis=1, keepdims=True) + layer[4])
+                values *= layer[2]
+                values += layer[3]
             np.maximum(values, 0.0, out=values)
-        return values @ weight + bias
+        raw: NDArray[np.float32] = values @ weight + bias
+        return raw
+
+
+def _layer(parts: list[NDArray[Any]]) -> list[NDArray[Any]]:
+    """Return a layer whose outputs, where they are normalised, are centred by weights and bias; gain times root n."""
+    if len(parts) == 2:
+        return parts
+    weight, bias, gain, shift = (part.astype(np.float64) for part in parts)
+    units = len(bias)
+    exact = [weight - weight.mean(axis=1, keepdims=True), bias - bias.mean(), gain * math.sqrt(units), shift,
+             np.array(units * LAYER_NORM_EPSILON)]
+    return [part.astype(np.float32) for part in exact]
 
 
 class _Actions:
@@ -186,13 +191,14 @@ class _Actions:
 
     def __init__(self, arrays: Arrays, shape: list[int]):
         self._first, self._last, self._shape = arrays["first_action"], arrays["last_action"], tuple(shape)
+        self._low, self._high = self._first.astype(np.float64), self._last.astype(np.float64)
 
     def of(self, controls: Array) -> NDArray[Any]:
         """Return the actions [B, *shape] for controls [B, A]; integers are rounded."""
         first, last = self._first, self._last
         if first.dtype.kind in "iub":
             controls = np.floor(controls + 0.5)
-        actions = np.minimum(np.maximum(controls, first.astype(np.float64)), last.astype(np.float64))
+        actions = np.minimum(np.maximum(controls, self._low), self._high)
         if first.dtype != np.float64:
             actions = np.minimum(np.maximum(actions.astype(first.dtype), first), last)
         return actions.reshape(len(actions), *self._shape)
@@ -216,13 +222,13 @@ class _Chain:
         skill = memory["skill"]
         if len(self._owners):
             outside = (~self._parts(observations)).astype(np.float64) @ self._owners
-            np.maximum(skill, np.where(outside == 0.0, self._order, 0).max(axis=1), out=skill)
+            np.maximum(skill, np.maximum.reduce(np.where(outside == 0.0, self._order, 0), axis=1), out=skill)
         return (observations - self._origins[skill]) / self._scales[skill], skill, None
 
     def _parts(self, observations: Array) -> NDArray[np.bool_]:
         """Return which parts of entries [B, N] observations [B, O] lie in: balls, then classifiers."""
         squares = (observations[:, None] - self._centers) ** 2
-        inside: NDArray[np.bool_] = (squares * self._weights).sum(axis=2) <= self._squares
+        inside: NDArray[np.bool_] = np.add.reduce(squares * self._weights, axis=2) <= self._squares
         if not self._classifiers:
             return inside
         learnt = [_chance(observations, *numbers) >= confidence for *numbers, confidence in self._classifiers]
@@ -260,7 +266,7 @@ class _Follower:
         """Move the pointers to the nearest points of those ahead, and count the steps since they moved last."""
         pointer, stalled = memory["pointer"], memory["stalled"]
         candidates = np.minimum(pointer[:, None] + self._reach, len(self.line) - 1)
-        nearest = ((self.line[candidates] - places[:, None]) ** 2).sum(axis=2).argmin(axis=1)
+        nearest = np.add.reduce((self.line[candidates] - places[:, None]) ** 2, axis=2).argmin(axis=1)
         moved = candidates[np.arange(len(places)), nearest]
         stalled[:] = np.where(moved > pointer, 0, stalled + 1)
         pointer[:] = moved
@@ -271,8 +277,8 @@ class _Follower:
         return ahead
 
     def _stalled(self, memory: Memory) -> Array:
-        share: Array = np.minimum(memory["stalled"] / self._patience, 1.0)
-        return share[:, None]
+        share: Array = np.minimum(memory["stalled"][:, None] / self._patience, 1.0)
+        return share
 
 
 class _RobotFollower(_Follower):
@@ -280,10 +286,12 @@ class _RobotFollower(_Follower):
 
     def __init__(self, words: Words, arrays: Arrays):
         super().__init__(words, arrays)
-        self._sides, self._actions = arrays["side_observations"], arrays["side_actions"]
+        sides, self._actions = arrays["side_observations"], arrays["side_actions"]
+        self._shape = sides.shape[:2]
+        self._all_sides = np.concatenate(list(sides)).T.copy()
         self._frame = FreeJoint(words["speeds"]) if words["speeds"] else Fixed()
         self._half = arrays["half"]
-        self._body = np.delete(np.arange(self._sides.shape[1]), self._entries)
+        self._body = np.delete(np.arange(self._shape[1]), self._entries)
 
     def step(self, observations: Array, memory: Memory) -> Step:
         """Return what the network sees [B, I], that it acts [B], and the side that leads [B].
@@ -293,92 +301,91 @@ class _RobotFollower(_Follower):
         """
         if not len(self.line):
             raise ValueError("there is no line to drive along; call follow(corners) first")
-        places = observations[:, self._entries]
+        places, rows = observations[:, self._entries], np.arange(len(observations))
         self._advance(places, memory)
-        side = memory["side"]
-        side[:] = self._leading(observations, places, memory["pointer"], side)
-        seen = (self._sides[side] @ observations[:, :, None])[:, :, 0]
-        c, s = self._frame.heading(seen)
-        ahead = self._ahead(places, memory["pointer"])
-        x, y = ahead[..., 0], ahead[..., 1]
-        c, s = c[:, None], s[:, None]
-        own = np.stack([c * x + s * y, c * y - s * x], axis=2).reshape(len(seen), -1)
-        body = (self._frame.turned(seen, c[:, 0], -s[:, 0])[:, self._body] - self._origin) / self._scale
+        pointer, side = memory["pointer"], memory["side"]
+        all_seen = (observations @ self._all_sides).reshape(len(rows), *self._shape)
+        headings = self._frame.heading(all_seen)
+        side[:] = self._leading(headings, places, pointer, side)
+        seen, turn = all_seen[rows, side], headings[rows, side].conj()
+        own = (_complex(self._ahead(places, pointer)) * turn[:, None]).view(np.float64)
+        body = (self._frame.turned(seen, turn)[:, self._body] - self._origin) / self._scale
         inputs = np.concatenate([body, own, self._stalled(memory)], axis=1)
-        return np.clip(inputs, -LARGEST, LARGEST), np.zeros(len(seen), np.int64), side
+        return np.minimum(np.maximum(inputs, -LARGEST), LARGEST), np.zeros(len(rows), np.int64), side
 
     def turned_back(self, controls: Array, side: Indices) -> Array:
         """Return the controls [B, A] of the robot for those of the side that leads."""
         return (controls[:, None] @ self._actions[side])[:, 0]
 
-    def _leading(self, observations: Array, places: Array, pointer: Indices, before: Indices) -> Indices:
-        """Return which side looks along the line [B]: the one that did as long as it does well enough."""
-        if len(self._sides) == 1:
+    def _leading(self, headings: Complex, places: Array, pointer: Indices, before: Indices) -> Indices:
+        """Return which side looks along the line [B]: the one that did as long as it does well enough.
+
+        Args:
+            headings: Where the sides look [B, S].
+            places: Where the robots are [B, 2].
+            pointer: The nearest points of the line [B].
+            before: The sides that led before [B], -1 for none.
+        """
+        if headings.shape[1] == 1:
             return np.zeros(len(places), np.int64)
-        last = len(self.line) - 1
-        x, y = (self.line[np.minimum(pointer + self._half, last)] - places).T
-        direction = _unit(x, y)
-        cosines = []
-        for one in self._sides:
-            c, s = self._frame.heading(observations @ one.T)
-            cosines.append(c * direction[0] + s * direction[1])
-        along = np.stack(cosines)
-        kept = along[np.maximum(before, 0), np.arange(len(places))] >= KEEP_SIDE
-        return np.where(kept & (before >= 0), before, along.argmax(axis=0))
+        direction = _unit(_complex(self.line[np.minimum(pointer + self._half, len(self.line) - 1)] - places))
+        along = (headings * direction.conj()[:, None]).real
+        kept = (along[np.arange(len(places)), before] >= KEEP_SIDE) & (before >= 0)
+        return before if kept.all() else np.where(kept, before, along.argmax(axis=1))
 
 
 class Fixed:
     """The frame of a robot that has no heading."""
 
-    def heading(self, seen: Array) -> tuple[Array, Array]:
-        """Return cosine and sine [B] of the direction in which the robot looks: that of the x axis."""
-        return np.ones(len(seen)), np.zeros(len(seen))
+    def heading(self, seen: Array) -> Complex:
+        """Return the directions [...] in which robots look: that of the x axis."""
+        return np.ones(seen.shape[:-1], np.complex128)
 
-    def turned(self, seen: Array, c: Array, s: Array) -> Array:
-        """Return what the robot observes of itself [B, O] in a turned world: the same."""
+    def turned(self, seen: Array, turn: Complex) -> Array:
+        """Return what robots observe of themselves [B, O] in a turned world: the same."""
         return seen
 
 
 class FreeJoint:
     """The frame of a robot whose observation begins with place and quaternion (w, x, y, z) of a free joint.
 
+    Vectors in the plane are complex numbers. The quaternion is two of them, w + iz and x + iy: the sum of their squares
+    points along the x axis of the joint, and a turn of the world by a multiplies both by exp(ia/2).
+
     Args:
         speeds: The entry where its speed begins.
     """
 
     def __init__(self, speeds: int):
-        self._x, self._y = speeds, speeds + 1
+        self._speeds = slice(speeds, speeds + 2)
 
-    def heading(self, seen: Array) -> tuple[Array, Array]:
-        """Return cosine and sine [B] of the direction in which the x axis of the joint points."""
-        w, x, y, z = seen[:, 3:7].T
-        return _unit(w * w + x * x - y * y - z * z, 2.0 * (w * z + x * y))
+    def heading(self, seen: Array) -> Complex:
+        """Return the directions [...] in which the x axis of the joint points in observations [..., O]."""
+        squares = np.square(_complex(seen.take(QUATERNION, axis=-1)))
+        return _unit(squares[..., 0] + squares[..., 1])
 
-    def turned(self, seen: Array, c: Array, s: Array) -> Array:
-        """Return observations [B, O] in a world turned by angles of cosine c and sine s [B]; the place is left out."""
-        turned, x, y = seen.copy(), seen[:, self._x], seen[:, self._y]
-        turned[:, self._x], turned[:, self._y] = c * x - s * y, s * x + c * y
-        h, k = _half_angle(c, s)
-        w, x, y, z = seen[:, 3:7].T
-        quaternion = np.stack([h * w - k * z, h * x - k * y, h * y + k * x, h * z + k * w], axis=1)
-        turned[:, 3:7] = quaternion * np.where(quaternion[:, :1] < 0, -1.0, 1.0)
+    def turned(self, seen: Array, turn: Complex) -> Array:
+        """Return observations [B, O] in a world that is turned [B]; the place is left out."""
+        turned = seen.copy()
+        turned[:, self._speeds] = (_complex(seen[:, self._speeds].copy()) * turn)[:, None].view(np.float64)
+        quaternion = _complex(seen.take(QUATERNION, axis=1)) * np.sqrt(turn)[:, None]
+        quaternion *= np.where(quaternion[:, :1].real < 0, -1.0, 1.0)
+        turned[:, QUATERNION] = quaternion.view(np.float64)
         return turned
 
 
-def _unit(x: Array, y: Array) -> tuple[Array, Array]:
-    """Return cosine and sine of the directions of vectors; those of the x axis for a vector of no length."""
-    length = np.hypot(x, y)
-    none = length == 0.0
-    length = np.where(none, 1.0, length)
-    return np.where(none, 1.0, x / length), y / length
+def _complex(vectors: Array) -> Complex:
+    """Return pairs of numbers [..., 2 K] as complex ones [..., K]; [...] where K is 1."""
+    numbers: Complex = vectors.view(np.complex128)
+    return numbers[..., 0] if vectors.shape[-1] == 2 else numbers
 
 
-def _half_angle(c: Array, s: Array) -> tuple[Array, Array]:
-    """Return cosine and sine of half of an angle, without loss of digits near 0 and near a half turn."""
-    larger = np.sqrt((1.0 + np.abs(c)) / 2.0)
-    smaller = np.abs(s) / (2.0 * larger)
-    sign = np.where(s < 0, -1.0, 1.0)
-    return np.where(c >= 0, larger, smaller), sign * np.where(c >= 0, smaller, larger)
+def _unit(vectors: Complex) -> Complex:
+    """Return vectors of length 1; those along the x axis for vectors of no length."""
+    lengths = np.abs(vectors)
+    if lengths.all():
+        return vectors / lengths
+    return np.where(lengths == 0.0, 1.0, vectors / np.where(lengths == 0.0, 1.0, lengths))
 
 
 def _line_through(corners: Array, spacing: float) -> Array:

@@ -152,7 +152,6 @@ def _first_speed(robot: Robot, size: int) -> int:
 
 def _is_free_joint(robot: Robot, seen: Array, angles: Array, first: int) -> bool:
     kind = deploy.FreeJoint(first)
-    c, s = kind.heading(seen)
     ours, theirs = (np.delete(rows, robot.place, axis=1) for rows in
-                    (kind.turned(seen, np.cos(angles), np.sin(angles)), robot.turned(seen, angles)))
-    return bool(np.allclose(np.arctan2(s, c), robot.heading(seen)) and np.allclose(ours, theirs))
+                    (kind.turned(seen, np.exp(1j * angles)), robot.turned(seen, angles)))
+    return bool(np.allclose(np.angle(kind.heading(seen)), robot.heading(seen)) and np.allclose(ours, theirs))
