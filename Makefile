@@ -14,7 +14,7 @@ WORKERS ?= 2
 .PHONY: help setup demo test slow stress check bench docs notebooks clean
 
 help:
-	@echo "make demo    install, train a skill chain on a 5x5 maze, show the result"
+	@echo "make demo    install, train a controller in a 5x5 maze, show the result"
 	@echo "make test    install, run the tests, show the maze solve rates"
 	@echo "make slow    the tests that take minutes"
 	@echo "make stress  kills, damaged files, bad inputs: half an hour"

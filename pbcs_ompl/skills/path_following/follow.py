@@ -298,6 +298,12 @@ class Follow:
         relay = Relay([policy, *(member.policy for member in self.members)],
                       [0, *(member.first for member in self.members)])
         place = self.task.place(first)
+        found = self._verdict(relay, place)
+        self.trainer.latest |= {"start": place, "success_rate": found.rate}
+        return found
+
+    def _verdict(self, relay: Relay, place: int) -> Verdict:
+        """Execute policies from a place of the plan: once without noise, then with it until the gate has an answer."""
         blocked = self._failures(relay, place, 1, 0.0)
         if len(blocked):
             return Verdict(False, 0.0, int(blocked[0]))
