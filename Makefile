@@ -9,14 +9,17 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
+# Workers begin with halves of the list, so what the tests of a module share is mostly made once.
+PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test slow stress check bench docs notebooks clean
+.PHONY: help setup demo test slow full stress check bench docs notebooks clean
 
 help:
 	@echo "make demo    install, train a controller in a 5x5 maze, show the result"
 	@echo "make test    install, run the tests, show the maze solve rates"
 	@echo "make slow    the tests that take minutes"
+	@echo "make full    the tests of test and of slow in one session"
 	@echo "make stress  kills, damaged files, bad inputs: half an hour"
 	@echo "make check   lint, types, direction of imports"
 	@echo "make bench   measure what the README's table states (takes long)"
@@ -39,10 +42,13 @@ demo: setup
 	$(BIN)/pbcs train --env pbcs/Maze-v0 --env-kwargs '{"size": 5, "maze_seed": 1}' --seed 0 --out runs/demo
 
 test: setup
-	$(BIN)/python -m pytest -n $(WORKERS)
+	$(PYTEST)
 
 slow: setup
-	$(BIN)/python -m pytest -n $(WORKERS) -m slow --ignore=tests/stress
+	$(PYTEST) -m slow --ignore=tests/stress
+
+full: setup
+	$(PYTEST) -m '' --ignore=tests/stress
 
 stress: setup
 	$(BIN)/python -m pytest -m slow -s tests/stress

@@ -18,11 +18,12 @@ from pbcs_ompl.cli.lists import MISSING_TORCH
 from pbcs_ompl.cli.models import describe
 from pbcs_ompl.cli.terminal import print_summary
 from pbcs_ompl.core.errors import InvalidOption, PbcsError
-from pbcs_ompl.core.registry import load_environments, names
+from pbcs_ompl.core.registry import load_environments, module_of, names
 from pbcs_ompl.results.command_line import command
 from pbcs_ompl.results.files import write_text
 
 SURVEY = "runs/doctor"
+STRATEGIES = "pbcs_ompl.planners"
 NEEDED = ("pbcs-ompl", "ompl", "gymnasium", "numpy", "scipy", "numba", "python-fcl", "matplotlib", "rich")
 OPTIONAL = ("torch", "safetensors", "mujoco", "gymnasium-robotics", "imageio", "stable-baselines3")
 
@@ -101,10 +102,17 @@ def _numbers(text: str) -> tuple[int, ...]:
 
 
 def _planners() -> dict[str, str]:
-    """Return for each registered planner "ready", or why it cannot be built here."""
+    """Return for each registered planner "ready", or why it cannot be built here.
+
+    Those of OMPL and of plug-ins are built. The strategies of the package need nothing that could be missing, and to
+    build them all would compile their kernels.
+    """
     space_information = _smallest_problem()
     states = {}
     for name in names("planner"):
+        if module_of("planner", name) == STRATEGIES:
+            states[name] = "ready"
+            continue
         try:
             PlannerSpec(name, {}).build(space_information, 0)
             states[name] = "ready"

@@ -21,6 +21,11 @@ def names(kind: str) -> list[str]:
     return sorted(_entries(kind))
 
 
+def module_of(kind: str, name: str) -> str:
+    """Return the module that a registered name is loaded from."""
+    return _entries(kind)[name].module
+
+
 def load(kind: str, name: str) -> Any:
     """Return the object registered as `name`, or the one that `module:attribute` names.
 

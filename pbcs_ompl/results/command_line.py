@@ -96,6 +96,11 @@ def eval_words(folder: str | Path, *, episodes: int | None = None, epsilon: floa
                                    for word in (name, str(value))), *_trust(trust)]
 
 
+def view_words(folder: Path, *, trust: bool = False) -> Words:
+    """Return the words that show a folder in three dimensions; `trust` imports the modules that it names."""
+    return ["view", str(folder), *_trust(trust)]
+
+
 def distill_words(config: dict[str, Any]) -> Words:
     """Return the words of a distillation; none where it is not known which chain it was made from."""
     if not config["chain"]:

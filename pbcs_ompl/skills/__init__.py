@@ -10,7 +10,7 @@ from pbcs_ompl.skills.robots.follower import RobotFollower
 from pbcs_ompl.skills.robots.train import FollowerResult, resume_follower, train_follower
 from pbcs_ompl.skills.settings import MethodSettings, preset_names
 from pbcs_ompl.skills.train import resume, train
-from pbcs_ompl.skills.training import TrainResult
+from pbcs_ompl.skills.train_result import TrainResult
 
 __all__ = ["DistillResult", "Evaluation", "FollowerResult", "MethodSettings", "RobotFollower", "Skill", "SkillChain",
            "TrainConfig", "TrainResult", "distill", "evaluate", "evaluate_follower", "load_chain", "method_settings",

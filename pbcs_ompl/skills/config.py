@@ -18,7 +18,7 @@ from pbcs_ompl.core.trust import config_modules, refuse_modules
 from pbcs_ompl.results import schema
 from pbcs_ompl.results.files import read_toml
 from pbcs_ompl.results.schema import check
-from pbcs_ompl.skills.agent_interface import Agent, AgentSettingsValues, load_agent
+from pbcs_ompl.skills.agent_interface import Agent, AgentFactory, AgentSettingsValues, far_sighted, load_agent
 from pbcs_ompl.skills.method import TrainingMethod
 from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings
 from pbcs_ompl.skills.pbcs import PBCS, PBCSSettings
@@ -195,10 +195,15 @@ class TrainConfig:
         except (KeyError, TypeError, AttributeError, InvalidOption) as error:
             raise DamagedFile(f"not the configuration of a training: {error}") from error
 
-    def agent_factory(self, model: ResettableModel) -> Callable[[int], Agent]:
+    def agent_factory(self, model: ResettableModel) -> AgentFactory:
         """Return a function that builds an agent for `model` from a seed."""
         kind, spaces = load_agent(self.agent), self.settings.agent_spaces(model)
-        return lambda seed: kind(*spaces, settings=self.agent_settings, seeds=(seed,), device=self.device)
+
+        def build(seed: int, horizon: float = 1.0) -> Agent:
+            settings = far_sighted(self.agent_settings, kind.settings_type, horizon)
+            return kind(*spaces, settings=settings, seeds=(seed,), device=self.device)
+
+        return build
 
 
 def read_config(path: Path, *, trust: bool = False) -> tuple[EnvSpec, TrainConfig, dict[str, str]]:

@@ -185,8 +185,10 @@ class PlanSettings(Settings):
             this number of steps (ours, not tuned: observations near the goal are of order one).
         preceding_waypoints: Waypoints before a start point from which random rollouts may begin (ours: as many as
             `rollout_steps`; with 0, training stalls at 52 % of a plan of Ex on MountainCarContinuous-v0, seed 0).
+        improve: Transitions that may make a plan shorter after the search, for each transition of the search (ours).
     """
 
+    improve: float = 0.0
     remove_loops: bool = False
     relative_observations: bool = False
     observation_horizon: int = 10
@@ -194,7 +196,7 @@ class PlanSettings(Settings):
 
     def _check_ranges(self) -> None:
         self._check_counts("observation_horizon")
-        self._check("at least 0", lambda value: value >= 0, "preceding_waypoints")
+        self._check("at least 0", lambda value: value >= 0, "improve", "preceding_waypoints")
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,8 @@ from pbcs_ompl.results.checksums import changed_files
 from pbcs_ompl.results.files import CHECKPOINT, CONFIG, PLAN, RESULT, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import RunFolder
 from pbcs_ompl.skills.config import TrainConfig, read_config
-from pbcs_ompl.skills.training import Training, TrainResult, training_versions
+from pbcs_ompl.skills.train_result import TrainResult
+from pbcs_ompl.skills.training import Training, training_versions
 
 
 @checked

@@ -2,10 +2,9 @@
 
 import time
 from copy import deepcopy
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -14,13 +13,11 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.bridge.verification import verify
 from pbcs_ompl.core.callbacks import code_of_others
-from pbcs_ompl.core.errors import BudgetUsedUp, Mismatch, NotVerified
+from pbcs_ompl.core.errors import BudgetUsedUp, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.signals import interruptible
-from pbcs_ompl.core.statistics import wilson
-from pbcs_ompl.core.types import Array, Counter, ProgressCallback
-from pbcs_ompl.resettable.task import Task
+from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.results.checksums import write_summed_json
 from pbcs_ompl.results.files import CHAIN, CHECKPOINT, CONFIG, PLAN, TRAJECTORY, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import RunFolder
@@ -28,70 +25,15 @@ from pbcs_ompl.results.progress import PROGRESS, ProgressLog
 from pbcs_ompl.results.provenance import planning_versions
 from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.config import METHODS, TrainConfig
-from pbcs_ompl.skills.evaluation import Evaluation, evaluate_chain
+from pbcs_ompl.skills.criterion import Outcome, judged
 from pbcs_ompl.skills.method import TrainingMethod, restore, write_checkpoint
-from pbcs_ompl.skills.settings import CriterionSettings, PlannedSettings
-from pbcs_ompl.skills.trained_controller import TrainedController
+from pbcs_ompl.skills.settings import PlannedSettings
+from pbcs_ompl.skills.train_result import TrainResult
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
 
 FIRST_CHECKPOINT_SECONDS, CHECKPOINT_SECONDS = 3.0, 30.0
 """Wall time to the first checkpoint and between later ones; it does not change the result."""
-
-
-@dataclass(frozen=True, eq=False)
-class TrainResult:
-    """The result of a training with its evidence.
-
-    Attributes:
-        solved: In fresh environments, the chain reaches the goal from the start without noise, and in at least 95 of
-            100 executions in which a tenth of the actions is random (see `CriterionSettings`).
-        reason: Why it is not solved; None when it is.
-        complete: Whether the method ended by itself; False when its budget or the planner's search ended first.
-        nominal, robust: The two evaluations that decide `solved`; None when training is not complete, or they cannot be
-            made (see `NotVerified`).
-        model_success_rate: Success rate of the noisy executions in the model that the chain was trained in; None where
-            `robust` is.
-        chain: The skills; None when there are none.
-        trajectory: The plan; None for methods without one, or when none was found.
-        waypoints: The states along which skills were trained [N+1, D]; None without a plan.
-        plan_transitions, train_transitions: Environment steps of the two phases; evaluations are not counted.
-        updates: Gradient steps.
-        seconds: Wall time of planning and training.
-        seed: Root of all random streams.
-        out: The folder; None when none was asked for.
-    """
-
-    solved: bool
-    reason: str | None
-    complete: bool
-    nominal: Evaluation | None
-    robust: Evaluation | None
-    model_success_rate: float | None
-    chain: TrainedController | None
-    trajectory: Trajectory | None
-    waypoints: Array | None
-    plan_transitions: int
-    train_transitions: int
-    updates: int
-    seconds: float
-    seed: int
-    out: str | None
-
-    def summary(self) -> dict[str, Any]:
-        """Return the plain numbers and words; `success_rate` and `wilson` are those of the noisy executions."""
-        robust, nominal = self.robust, self.nominal
-        return {"solved": self.solved, "reason": self.reason, "complete": self.complete,
-                "success_rate": robust.success_rate if robust else 0.0,
-                "wilson": list(robust.wilson) if robust else None,
-                "model_success_rate": self.model_success_rate,
-                "nominal_success_rate": nominal.success_rate if nominal else 0.0,
-                "steps_median": nominal.steps_median if nominal else None,
-                "skills": self.chain.num_policies if self.chain else 0,
-                "plan_transitions": self.plan_transitions, "train_transitions": self.train_transitions,
-                "updates": self.updates, "seconds": self.seconds, "seed": self.seed, "out": self.out}
-
-
 WARM_UP_ROWS = 256
 """Transitions of a first update."""
 
@@ -172,17 +114,25 @@ class Training:
     def _search(self) -> tuple[Trajectory | None, int, str | None]:
         found = plan(self.model, self.config.planner, planner_kwargs=self.config.planner_kwargs,
                      seed=self.seeds.child("plan").integer(), max_transitions=self.config.max_transitions,
-                     on_progress=self._report_planning)
+                     improve=self._allowance, on_progress=self._report_planning)
+        transitions = found.transitions + (found.improvement.transitions if found.improvement else 0)
         if self.folder:
             config = read_toml(self.folder.path / CONFIG)
             self.folder.write_config(config | {"planner_kwargs": found.planner_settings})
         unverified = found.found and found.replay_ok is None
         if not (found.solved or unverified):
             reason = found.reason if found.found else "the planner found no path to the goal within the budget"
-            return None, found.transitions, reason
+            return None, transitions, reason
         if found.trajectory is not None:
-            self._keep_plan(found.trajectory, found.transitions)
-        return found.trajectory, found.transitions, None
+            self._keep_plan(found.trajectory, transitions)
+        return found.trajectory, transitions, None
+
+    @property
+    def _allowance(self) -> str | None:
+        """What making a plan shorter may use, for `plan`."""
+        settings = self.config.settings
+        share = settings.plan.improve if isinstance(settings, PlannedSettings) else 0.0
+        return f"{100 * share:g}%" if share else None
 
     def _keep_plan(self, trajectory: Trajectory, transitions: int) -> None:
         if self.path:
@@ -276,7 +226,8 @@ class Training:
         if method is not None:
             self._report(method, last=True)
         chain = None if method is None else method.chain(self.settings.steps_per_skill)
-        outcome = _Outcome(ended_early, None, None, None) if ended_early else self._judge(chain, trajectory)
+        outcome = Outcome(ended_early) if ended_early else judged(
+            chain, trajectory, self.model, self.settings.criterion, self.config.seed)
         result = TrainResult(
             solved=outcome.reason is None, reason=outcome.reason, complete=ended_early is None, nominal=outcome.nominal,
             robust=outcome.robust, model_success_rate=outcome.model_success_rate, chain=chain, trajectory=trajectory,
@@ -286,25 +237,6 @@ class Training:
             out=str(self.path) if self.path else None)
         self._write(result)
         return result
-
-    def _judge(self, chain: TrainedController | None, trajectory: Trajectory | None) -> "_Outcome":
-        """Execute a complete chain in fresh environments; without a chain, nothing has to be done in them."""
-        criterion, seed = self.settings.criterion, self.config.seed
-        task = Task(self.model.spec, self.model.make_env)
-        if chain is None:
-            done = trajectory is not None and not trajectory.length and verify(trajectory, self.model).solved
-            return _Outcome(None if done else "there is no skill", None, None, None)
-        try:
-            nominal = evaluate_chain(chain, task, episodes=1, epsilon=0.0, seed=seed)
-            robust = evaluate_chain(chain, task, episodes=criterion.robust_episodes, epsilon=criterion.robust_epsilon,
-                                    seed=seed)
-        except NotVerified as error:
-            return _Outcome(str(error), None, None, None)
-        starts = np.repeat(chain.start[None], criterion.robust_episodes, axis=0)
-        believed = chain.rollouts(self.model, starts, epsilon=criterion.robust_epsilon,
-                                  rng=self.seeds.child("model evaluation").generator())
-        rate = float(believed.success.mean())
-        return _Outcome(failure(nominal, robust, rate, criterion), nominal, robust, rate)
 
     def _write(self, result: TrainResult) -> None:
         if self.folder is None:
@@ -346,28 +278,3 @@ class Training:
 def training_versions() -> dict[str, str]:
     """Return the versions of packages that a training depends on."""
     return planning_versions() | {"torch": version("torch")}
-
-
-class _Outcome(NamedTuple):
-    """What a training came to: why it is not solved, what the judge found, and what the model says."""
-
-    reason: str | None
-    nominal: Evaluation | None
-    robust: Evaluation | None
-    model_success_rate: float | None
-
-
-def failure(nominal: Evaluation, robust: Evaluation, believed: float, criterion: CriterionSettings) -> str | None:
-    """Return why a complete training does not meet the criterion of a solved one; None when it does."""
-    if nominal.success_rate == 1 and robust.success_rate >= criterion.robust_rate:
-        return None
-    if nominal.success_rate < 1:
-        ending = next(iter(nominal.endings))
-        found = f"the chain does not reach the goal without noise (the episode ended: {ending})"
-    else:
-        found = (f"{robust.successes} of {robust.episodes} executions with {robust.epsilon:.0%} random actions "
-                 f"succeed, expected {criterion.robust_rate:.0%}")
-    if robust.wilson[1] < wilson(round(believed * robust.episodes), robust.episodes)[0]:  # both are samples
-        found += (f"; in the model that it was trained in {believed:.0%} succeed, so the model is not true to the "
-                  f"environment: run pbcs doctor")
-    return found

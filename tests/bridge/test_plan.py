@@ -340,6 +340,7 @@ main(sys.argv[1])
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["Ex", "KPIECE1"])
 def test_memory_stays_flat_over_200_plans(planner):
     command = [sys.executable, "-c", MEMORY, planner]

@@ -92,6 +92,12 @@ def test_help_and_version_import_nothing_heavy():
         assert not imported & {"numpy", "ompl", "torch", "gymnasium", "matplotlib", "rich", "numba"}
 
 
+def test_a_look_at_the_installation_compiles_nothing():
+    code = "import sys, pbcs_ompl.cli as c; assert c.main(['doctor']) == 0; print('numba' in sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines()[-1] == "False"
+
+
 def test_help_names_every_verb(capsys):
     with pytest.raises(SystemExit) as stop:
         main(["--help"])

@@ -63,6 +63,7 @@ def without_torch(lines: list[str], folder: Path) -> list[tuple[int, str]]:
     return [tuple(end) for end in json.loads(run.stdout.splitlines()[-1])]
 
 
+@pytest.mark.slow
 def test_without_torch_there_are_plans_and_the_rest_is_named(tmp_path: Path) -> None:
     works = ["demo --out demo", "compare --planners Ex --env pbcs/Maze-v0 --env-kwargs '{\"size\": 2}' --seeds 1",
              "report .", "study ex-settings --emit make --out study", "view demo"]

@@ -31,7 +31,16 @@ def commands(text):
     return [line for line in lines if line.startswith("pbcs ")]
 
 
-SNIPPETS = [pytest.param(code, id=f"{page.name}-{number}")
+LONG = re.compile(r"\bpbcs (train|study|compare|distill)\b|\b(train|compare|train_follower)\(")
+"""What takes long: it trains, or starts processes."""
+
+
+def slow_if_long(text):
+    """Return the marks of a test of commands or code."""
+    return [pytest.mark.slow] if LONG.search(text) else []
+
+
+SNIPPETS = [pytest.param(code, id=f"{page.name}-{number}", marks=slow_if_long(code) if page in ALONE[1:] else [])
             for page in ALONE for number, code in enumerate(blocks(page.read_text(), "python"))]
 ELSEWHERE = [line for page in ALONE[1:] for line in commands(page.read_text())]
 STUDY = re.compile(r"pbcs study (\S+)(?!.*--emit)")
@@ -64,7 +73,7 @@ def test_the_readmes_command_lines_work_one_after_the_other(tmp_path, monkeypatc
         assert "Traceback" not in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("line", ELSEWHERE)
+@pytest.mark.parametrize("line", [pytest.param(line, marks=slow_if_long(line)) for line in ELSEWHERE])
 def test_command_lines_of_the_docs_work(line, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
@@ -74,7 +83,8 @@ def test_command_lines_of_the_docs_work(line, tmp_path, monkeypatch):
         assert find_study(parse(build_parser(), shlex.split(line)[1:]).id).id == study_of(line)
 
 
-@pytest.mark.parametrize("page", IN_ORDER, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [pytest.param(page, id=page.name, marks=slow_if_long(page.read_text()))
+                                  for page in IN_ORDER])
 def test_pages_work_from_top_to_bottom(page, tmp_path, monkeypatch, capsys):
     """What needs a library that is not installed here is refused, and named, or left out."""
     monkeypatch.chdir(tmp_path)
@@ -138,6 +148,7 @@ def test_every_folder_of_the_overview_exists():
     assert packages - named == {"pbcs_ompl/planners", "pbcs_ompl/envs"}
 
 
+@pytest.mark.slow
 def test_the_picture_is_what_its_command_makes(tmp_path, monkeypatch):
     """The command is that of `make demo`, which the caption names."""
     from matplotlib.image import imread

@@ -67,7 +67,8 @@ FAMILIES = {
 }
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", [pytest.param(family, marks=[] if family == "get and set" else [pytest.mark.slow])
+                                    for family in FAMILIES])
 def test_every_step_works_in_a_new_process(family: str, tmp_path: Path) -> None:
     if family == "mujoco":
         pytest.importorskip("mujoco")

@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import pbcs_ompl
 from pbcs_ompl.core.compiled import kernel_files
 
@@ -33,6 +35,7 @@ print(caller())
 """
 
 
+@pytest.mark.slow
 def test_a_kernel_is_compiled_again_when_one_that_it_calls_has_changed(tmp_path):
     (tmp_path / "caller.py").write_text(CALLER)
     (tmp_path / "main.py").write_text(MAIN)

@@ -24,11 +24,15 @@ EXAMPLES = {
 }
 
 
+QUICK = ("plan_a_maze.py", "own_planner.py", "own_environment.py")
+
+
 def test_every_example_is_tested():
     assert {path.name for path in (ROOT / "examples").glob("*.py")} == set(EXAMPLES)
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow])
+                                  for name in EXAMPLES])
 def test_example_runs(name, tmp_path):
     if "stable_baselines" in name:
         pytest.importorskip("stable_baselines3")

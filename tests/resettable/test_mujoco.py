@@ -20,7 +20,8 @@ GYMNASIUM = ["Ant-v5", "Hopper-v5", "InvertedDoublePendulum-v5", "Reacher-v5"]
 ROBOTICS = ["PointMaze_UMaze-v3", "AntMaze_UMaze-v5", "AdroitHandHammer-v1"]
 
 
-@pytest.fixture(params=[*GYMNASIUM, *ROBOTICS], scope="module")
+@pytest.fixture(params=[*GYMNASIUM, *(pytest.param(name, marks=pytest.mark.slow) for name in ROBOTICS)],
+                scope="module")
 def model(request: pytest.FixtureRequest) -> Any:
     if request.param in ROBOTICS:
         pytest.importorskip("gymnasium_robotics")

@@ -22,9 +22,9 @@ from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.files import read_toml
 from pbcs_ompl.skills import Evaluation, SkillChain, resume, train
+from pbcs_ompl.skills.criterion import failure
 from pbcs_ompl.skills.policy import policy_to_arrays
 from pbcs_ompl.skills.settings import CriterionSettings
-from pbcs_ompl.skills.training import failure
 
 MAZE = {"size": 2}
 
@@ -73,7 +73,7 @@ class StopAfter:
             raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
 def test_a_training_that_was_stopped_or_killed_resumes_bit_for_bit(tmp_path, number):
     """A Ctrl-C may happen anywhere within a step, which is finished first; a kill goes back to the last checkpoint."""
     whole = train("pbcs/Maze-v0", method="pbcs", env_kwargs={"size": 3}, seed=1)

@@ -21,6 +21,7 @@ from pbcs_ompl.results.command_line import (
     resume_words,
     study_words,
     train_words,
+    view_words,
 )
 from pbcs_ompl.results.files import CHECKPOINT, PLAN, TRAJECTORY, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import Folder
@@ -51,6 +52,16 @@ def resuming(folder: Folder) -> str:
     if folder.kind in ("compare", "study") and folder.result is None and repeating(folder).startswith("pbcs "):
         return command([*_words(folder), "--out", str(folder.path)])
     return ""
+
+
+def viewing(folder: Folder) -> str:
+    """Return the command that shows a plan or a training in three dimensions; "" for other folders.
+
+    A report holds no such page: it would run scripts, and needs the environment, which a report does not make.
+    """
+    if folder.kind not in ("plan", "train") or folder.result is None or not _is_available(folder):
+        return ""
+    return command(view_words(folder.path, trust=_names_modules(folder.config)))
 
 
 def _is_available(folder: Folder) -> bool:

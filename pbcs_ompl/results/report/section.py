@@ -12,7 +12,7 @@ from pbcs_ompl.results.checksums import changed_files
 from pbcs_ompl.results.files import CONFIG, FIGURES, RUNS, read_bytes
 from pbcs_ompl.results.folder import read_folder
 from pbcs_ompl.results.report.contents import Content, Table, read_content
-from pbcs_ompl.results.report.repeat import repeating, resuming
+from pbcs_ompl.results.report.repeat import repeating, resuming, viewing
 
 DAMAGED = "damaged"
 
@@ -57,7 +57,7 @@ class Section:
         figures: Its pictures.
         settings: Its config.toml.
         versions: The versions and machines that made it.
-        repeat, resume: Commands; "" where there is none.
+        repeat, resume, view: Commands; "" where there is none.
     """
 
     name: str
@@ -68,6 +68,7 @@ class Section:
     versions: Table
     repeat: str
     resume: str
+    view: str
 
 
 def make_section(path: Path, root: Path) -> Section:
@@ -84,7 +85,7 @@ def make_section(path: Path, root: Path) -> Section:
     content = replace(content, failures=[*changed, *content.failures])
     return Section(_name(path, root), folder.kind, content, [read_figure(picture) for picture in pictures],
                    read_bytes(path / CONFIG).decode("utf-8"), _versions(folder.provenance), repeating(folder),
-                   resuming(folder))
+                   resuming(folder), viewing(folder))
 
 
 def _check_inside(folder: Path, files: list[Path]) -> None:
@@ -102,7 +103,7 @@ def _check_inside(folder: Path, files: list[Path]) -> None:
 def damaged_section(path: Path, root: Path, reason: str) -> Section:
     """Return the section of a folder that cannot be read, among others that can."""
     content = Content("A folder that cannot be read", DAMAGED, False, [], failures=[(DAMAGED, reason)])
-    return Section(_name(path, root), DAMAGED, content, [], "", _versions([]), "", "")
+    return Section(_name(path, root), DAMAGED, content, [], "", _versions([]), "", "", "")
 
 
 def _name(path: Path, root: Path) -> str:

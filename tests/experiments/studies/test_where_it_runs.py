@@ -137,6 +137,7 @@ def test_limits_of_a_run_come_from_outside(folder, study):
     assert "killed after 0.5 s" in said
 
 
+@pytest.mark.slow
 def test_the_makefile_makes_each_run_once_and_then_the_analysis(folder, study, tmp_path):
     status, answer = study("--emit make --max-seconds 60")
     assert (status, answer["runs"], answer["file"]) == (0, 2, str(tmp_path / "out/Makefile"))
@@ -148,6 +149,7 @@ def test_the_makefile_makes_each_run_once_and_then_the_analysis(folder, study, t
     assert json.loads((tmp_path / "out/result.json").read_text())["agrees"][0]["agrees"]
 
 
+@pytest.mark.slow
 def test_the_slurm_script_is_bash_and_its_tasks_make_each_run_once(folder, study, tmp_path):
     status, answer = study("--emit slurm")
     assert status == 0

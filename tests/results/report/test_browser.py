@@ -23,7 +23,8 @@ addEventListener("load", () => {
   document.body.dataset.probe = JSON.stringify({images, fetched, overflow, errors});
 });
 </script></head>"""
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here (Debian: apt-get install chromium)")
+pytestmark = [pytest.mark.slow,
+              pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here (Debian: apt-get install chromium)")]
 
 
 def browse(page, profile, width):

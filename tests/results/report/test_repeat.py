@@ -17,7 +17,7 @@ from pbcs_ompl.experiments.sweep import environment_specs, make_sweep
 from pbcs_ompl.results.command_line import command, environment_words
 from pbcs_ompl.results.files import read_toml, to_toml
 from pbcs_ompl.results.folder import Folder, read_folder
-from pbcs_ompl.results.report.repeat import repeating, resuming
+from pbcs_ompl.results.report.repeat import repeating, resuming, viewing
 from pbcs_ompl.skills.config import TrainConfig
 
 
@@ -115,6 +115,13 @@ def test_what_has_not_ended_can_go_on(laboratory, call, monkeypatch):
         assert resuming(folder) == ""
         _, options = call(resuming(Folder(folder.path, folder.kind, folder.config, None, [])))
         assert Path(options["out"]) == folder.path
+
+
+def test_plans_and_trainings_can_be_seen(laboratory):
+    found = {name: viewing(read_folder(laboratory / "runs" / name)) for name in ("plan", "training", "comparison")}
+    places = {name: laboratory / "runs" / name for name in found}
+    assert found == {"plan": f"pbcs view {places['plan']}", "training": f"pbcs view {places['training']}",
+                     "comparison": ""}
 
 
 @pytest.mark.parametrize(("changes", "name"), [
