@@ -69,7 +69,7 @@ SMALL = {
                          "scenes": {"maze-2": {"env": "pbcs/Maze-v0", "env_kwargs": {"size": 2}}}},
 }
 SLOW = ("antmaze-exploration", "backplay-2x2", "closed-loop", "deadlock", "exploration-trees", "half-cheetah-priming",
-        "offline-vs-bootstrapped", "pbcs-ablation", "toy-analysis")
+        "maze-table", "offline-vs-bootstrapped", "pbcs-ablation", "toy-analysis", "tree-pitfalls")
 
 
 SIMULATED = ("antmaze-exploration", "half-cheetah-priming")
