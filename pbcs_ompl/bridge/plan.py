@@ -11,8 +11,8 @@ import gymnasium
 from ompl import base as ob
 
 from pbcs_ompl.bridge.coverage import Coverage, TransitionRecorder
-from pbcs_ompl.bridge.improve import Allowance, Improvement
-from pbcs_ompl.bridge.improve import improve as improve_plan
+from pbcs_ompl.bridge.improvement.allowance import Allowance, Improvement
+from pbcs_ompl.bridge.improvement.improve import improve as improve_plan
 from pbcs_ompl.bridge.planner_spec import PlannerSpec, as_batch_planner
 from pbcs_ompl.bridge.problem import CallbackState, Problem, make_problem
 from pbcs_ompl.bridge.termination import Limits, checked_limits, make_stop

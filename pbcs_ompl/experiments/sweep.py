@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from pbcs_ompl.bridge.improve import Allowance
+from pbcs_ompl.bridge.improvement.allowance import Allowance
 from pbcs_ompl.bridge.planner_spec import PlannerSpec
 from pbcs_ompl.bridge.problem import make_problem
 from pbcs_ompl.bridge.termination import checked_limits

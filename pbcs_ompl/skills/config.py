@@ -155,7 +155,7 @@ class TrainConfig:
         Raises:
             UnknownName, InvalidOption: see the class; also a planner or a trajectory that is not used.
         """
-        method = read_preset(preset)["method"] if method is None else method
+        method = str(read_preset(preset)["method"]) if method is None else method
         entry = find_method(method)
         needs_plan = entry.needs_plan
         if not needs_plan and (planned or planner is not None or planner_kwargs):

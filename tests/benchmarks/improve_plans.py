@@ -7,7 +7,7 @@
    what the improvement takes beside the search.
 2. Environments without a known shortest plan: median steps before and after.
 
-Every plan is executed in a fresh environment, and only these are counted. The constants of `bridge/improve.py` were
+Every plan is executed in a fresh environment, and only these are counted. The constants of `bridge/improvement/improve.py` were
 chosen on mazes 100 to 107 of 9x9 and 15x15.
 """
 

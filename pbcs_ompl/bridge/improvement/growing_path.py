@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from pbcs_ompl.bridge.free_space import ShortCut
+from pbcs_ompl.bridge.improvement.free_space import ShortCut
 from pbcs_ompl.core.types import Array, Transition
 
 

@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pbcs_ompl.bridge.free_motion import FreeMotion
-from pbcs_ompl.bridge.free_space import CAUTION, FreeSpace
-from pbcs_ompl.bridge.kernels.sight import SAMPLES, shortest_way
+from pbcs_ompl.bridge.improvement.free_motion import FreeMotion
+from pbcs_ompl.bridge.improvement.free_space import CAUTION, FreeSpace
+from pbcs_ompl.bridge.improvement.sight import SAMPLES, shortest_way
 
 
 def transitions(world, rng, count=400):

@@ -11,19 +11,18 @@ which has saved more for its transitions so far.
 """
 
 import time
-from dataclasses import dataclass, field
-from math import isfinite, nan
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from pbcs_ompl.bridge.free_motion import FreeMotion
-from pbcs_ompl.bridge.free_space import FreeSpace, ShortCut
-from pbcs_ompl.bridge.growing_path import GrowingPath
-from pbcs_ompl.bridge.steering import Steering
+from pbcs_ompl.bridge.improvement.allowance import Allowance, Improvement
+from pbcs_ompl.bridge.improvement.free_motion import FreeMotion
+from pbcs_ompl.bridge.improvement.free_space import FreeSpace, ShortCut
+from pbcs_ompl.bridge.improvement.growing_path import GrowingPath
+from pbcs_ompl.bridge.improvement.steering import Steering
 from pbcs_ompl.bridge.trajectory import Trajectory, from_controls
 from pbcs_ompl.core.callbacks import check_finite, code_of_others
-from pbcs_ompl.core.errors import BudgetUsedUp, InvalidOption
+from pbcs_ompl.core.errors import BudgetUsedUp
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.tree import Tree
@@ -45,57 +44,6 @@ MOST_ENDS = 128
 """States of the plan at which short cuts may begin or end."""
 LONGEST_REPLAY = 8
 """Steps of the plan that are tried where no ride succeeds."""
-
-
-class Allowance(NamedTuple):
-    """What improving a plan may use: one of a number of transitions, a share of those of the search, wall time."""
-
-    transitions: int | None = None
-    share: float | None = None
-    seconds: float | None = None
-
-    @classmethod
-    def of(cls, amount: int | str) -> Self:
-        """Return what an amount stands for: 5000 transitions, "10%" of those of the search, "2s" of wall time.
-
-        Raises:
-            InvalidOption: it is none of these, or not above 0.
-        """
-        text = str(amount).strip()
-        number = text.removesuffix("%").removesuffix("s")
-        kind = text[len(number):]
-        try:
-            value = float(number)
-        except ValueError:
-            value = nan
-        if not (isfinite(value) and value > 0) or kind == "%s" or (kind == "" and value != int(value)):
-            raise InvalidOption(f"improve is {amount!r}; expected a number of transitions as 5000, a share of those of "
-                                f"the search as '10%', or seconds as '2s'")
-        if kind == "":
-            return cls(transitions=int(value))
-        return cls(share=value / 100.0) if kind == "%" else cls(seconds=value)
-
-    def after(self, transitions: int) -> Self:
-        """Return the allowance after a search with a number of transitions: a share of them becomes a number."""
-        return self if self.share is None else type(self)(transitions=int(self.share * transitions))
-
-
-@dataclass(frozen=True)
-class Improvement:
-    """What improving a plan has brought.
-
-    Attributes:
-        before, after: Steps of the plan.
-        transitions: Environment steps that were made for it, beside those of the search.
-        seconds: Wall time.
-        progress: After how many of these transitions and seconds the plan had which length, first that of the search.
-    """
-
-    before: int
-    after: int
-    transitions: int
-    seconds: float
-    progress: dict[str, list[Any]] = field(default_factory=dict)
 
 
 class _Anchor(NamedTuple):

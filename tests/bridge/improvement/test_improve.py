@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pbcs_ompl.bridge.improve import Allowance, improve
+from pbcs_ompl.bridge.improvement.allowance import Allowance
+from pbcs_ompl.bridge.improvement.improve import improve
+from pbcs_ompl.bridge.improvement.steering import Steering
 from pbcs_ompl.bridge.plan import plan, read_plan
-from pbcs_ompl.bridge.steering import Steering
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption
 from pbcs_ompl.envs.maze.maze import MazeEnv

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pbcs_ompl.bridge.free_motion import FreeMotion
+from pbcs_ompl.bridge.improvement.free_motion import FreeMotion
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 
 EDGE = 0.5
@@ -71,7 +71,7 @@ class FreeSpace:
             states: All states of the plan [T+1, D].
             index: These states, the first and the last among them, in their order [M].
         """
-        from pbcs_ompl.bridge.kernels.sight import shortest_way  # compiled when it is imported
+        from pbcs_ompl.bridge.improvement.sight import shortest_way  # compiled when it is imported
 
         points = (self._motion.in_steps(states[index]) - self._low) / self._edges
         before, straight = shortest_way(np.clip(points, 0.0, self._shape - 1e-6), index, self._motion.low / self._edges,
