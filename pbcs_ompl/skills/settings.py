@@ -262,7 +262,7 @@ def preset_names() -> list[str]:
 
 @cache
 def read_preset(name: str) -> dict[str, Any]:
-    """Return the tables of a preset and its "version", which grows whenever one of its values changes.
+    """Return the tables of a preset, its usual "method", and a "version" that grows whenever one of its values changes.
 
     Raises:
         UnknownName: no such preset; the message suggests the closest one.

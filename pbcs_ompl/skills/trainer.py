@@ -45,7 +45,7 @@ class SkillTrainer:
         self.horizon = 1.0
         self.agent = make_agent(self.agent_seed)
         self.latest: dict[str, float] = {}
-        """Where the last session started, its success rate, and the losses of its updates: for those who look on."""
+        """Where the last session or test started, its success rate, the losses of updates: for those who look on."""
         self.set_target(waypoints.last)
 
     def set_target(self, end_index: int, target: Target | None = None) -> None:

@@ -303,6 +303,12 @@ class Follow:
 
     def _try(self, policy: Policy, first: int) -> Verdict:
         """Test a policy, and the finished ones after it, from a pointer on."""
+        found = self._verdict(policy, first)
+        self.trainer.latest |= {"start": self.task.place(first), "success_rate": max(0.0, found.rate)}
+        return found
+
+    def _verdict(self, policy: Policy, first: int) -> Verdict:
+        """Execute it once without noise, then from where the last one failed, then from the pointer on with noise."""
         relay = Relay([policy, *(member.policy for member in self.members)],
                       [0, *(member.first for member in self.members)])
         start, goal = self.task.at(np.array([self.task.place(first)])), np.array([self.task.line.last + 1])
