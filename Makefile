@@ -16,7 +16,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 .PHONY: help setup demo test slow full stress check bench docs notebooks clean
 
 help:
-	@echo "make demo    install, train a skill chain on a 5x5 maze, show the result"
+	@echo "make demo    install, train a controller in a 5x5 maze, show the result"
 	@echo "make test    install, run the tests, show the maze solve rates"
 	@echo "make slow    the tests that take minutes"
 	@echo "make full    the tests of test and of slow in one session"

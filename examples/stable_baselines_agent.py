@@ -96,4 +96,4 @@ class StableTD3:
 
 if __name__ == "__main__":
     result = pbcs_ompl.train("pbcs/Maze-v0", env_kwargs={"size": 2}, agent="stable_baselines_agent:StableTD3")
-    print(f"solved: {result.solved}, {len(result.chain.skills)} skills, {result.updates:,} updates")
+    print(f"solved: {result.solved}, {result.updates:,} updates")

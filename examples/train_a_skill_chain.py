@@ -18,7 +18,7 @@ def main(size: str = "2", folder: str = "runs/example-chain") -> None:
         sys.exit("no path was found")
     print(f"plan: {plan.path_length} steps, open loop")
 
-    result = pbcs_ompl.train(model, trajectory=plan.trajectory, seed=0)
+    result = pbcs_ompl.train(model, method="pbcs", trajectory=plan.trajectory, seed=0)
     if result.chain is None:
         sys.exit(result.reason)
     print(f"chain: {len(result.chain.skills)} skills, {result.summary()['train_transitions']:,} transitions")

@@ -23,7 +23,17 @@ if TYPE_CHECKING:
     from pbcs_ompl.resettable import ResetReport, check_resettable, make
     from pbcs_ompl.results.export import Export, export
     from pbcs_ompl.results.report import Report, write_report
-    from pbcs_ompl.skills import DistillResult, Evaluation, SkillChain, TrainResult, distill, evaluate, resume, train
+    from pbcs_ompl.skills import (
+        DistillResult,
+        Evaluation,
+        SkillChain,
+        TrainResult,
+        distill,
+        evaluate,
+        load_chain,
+        resume,
+        train,
+    )
 
 __all__ = [
     "Comparison",
@@ -43,6 +53,7 @@ __all__ = [
     "distill",
     "evaluate",
     "export",
+    "load_chain",
     "make",
     "plan",
     "resume",
@@ -60,7 +71,8 @@ _MODULES = {
     "resettable": ("ResetReport", "check_resettable", "make"),
     "results.export": ("Export", "export"),
     "results.report": ("Report", "write_report"),
-    "skills": ("DistillResult", "Evaluation", "SkillChain", "TrainResult", "distill", "evaluate", "resume", "train"),
+    "skills": ("DistillResult", "Evaluation", "SkillChain", "TrainResult", "distill", "evaluate", "load_chain",
+               "resume", "train"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 

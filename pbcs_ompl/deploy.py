@@ -247,11 +247,10 @@ class _Follower:
 
     def __init__(self, words: Words, arrays: Arrays):
         self.line: Array = arrays.get("line", np.empty((0, 2)))
-        self._distances, self._firsts = arrays["distances"], arrays["firsts"]
-        self._entries, self._unit = arrays["entries"], arrays["unit"]
-        self._origin, self._scale = arrays["origin"], arrays["scale"]
-        self._patience = words["patience"]
-        self._reach = np.arange(words["reach"] + 1)
+        self._distances, self._firsts, self._entries = arrays["distances"], arrays["firsts"], arrays["entries"]
+        self._unit, self._origin, self._scale = arrays["unit"], arrays["origin"], arrays["scale"]
+        self._patience, self._reach = words["patience"], np.arange(words["reach"] + 1)
+        self._pass_radius = arrays.get("pass_radius", np.inf)  # of older files
 
     def step(self, observations: Array, memory: Memory) -> Step:
         """Return what networks see [B, I], which one acts [B], and no side."""
@@ -266,19 +265,20 @@ class _Follower:
         """Move the pointers to the nearest points of those ahead, and count the steps since they moved last."""
         pointer, stalled = memory["pointer"], memory["stalled"]
         candidates = np.minimum(pointer[:, None] + self._reach, len(self.line) - 1)
-        nearest = np.add.reduce((self.line[candidates] - places[:, None]) ** 2, axis=2).argmin(axis=1)
-        moved = candidates[np.arange(len(places)), nearest]
+        squares = np.add.reduce((self.line[candidates] - places[:, None]) ** 2, axis=2)
+        barred = (squares[:, 1:] > squares[:, :-1]) & (squares[:, 1:] > self._pass_radius ** 2)
+        squares[:, 1:][np.logical_or.accumulate(barred, axis=1)] = np.inf
+        moved = candidates[np.arange(len(places)), squares.argmin(axis=1)]
         stalled[:] = np.where(moved > pointer, 0, stalled + 1)
         pointer[:] = moved
 
     def _ahead(self, places: Array, pointer: Indices) -> Array:
         """Return the points of the line at the distances ahead, relative to where the episodes are [B, K, F]."""
-        ahead: Array = self.line[np.minimum(pointer[:, None] + self._distances, len(self.line) - 1)] - places[:, None]
-        return ahead
+        shown = np.minimum(pointer[:, None] + self._distances, len(self.line) - 1)
+        return np.asarray(self.line[shown] - places[:, None])
 
     def _stalled(self, memory: Memory) -> Array:
-        share: Array = np.minimum(memory["stalled"][:, None] / self._patience, 1.0)
-        return share
+        return np.asarray(np.minimum(memory["stalled"][:, None] / self._patience, 1.0))
 
 
 class _RobotFollower(_Follower):

@@ -65,6 +65,7 @@ class Rides(Strategy):
         self._rides = np.zeros((0, 10), np.int64)
         self._actions = np.empty((0, self._bounds.shape[1]))
         self._riding = 0
+        self._limits = rides_loop.Limits(context.episode_steps)
 
     def resolved(self) -> dict[str, Any]:
         """Return the edges of the bins."""
@@ -98,7 +99,7 @@ class Rides(Strategy):
         """Put the new nodes into their bins, and end the rides that are over."""
         self.regions = reserve(self.regions, last - first, last - first)
         rides_loop.note(self.regions, self._yields, self._rides, self._riding, tree.columns, first, last, self._size,
-                          self.context.episode_steps)
+                          self._limits)
 
     def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:
         """Ride for `count` steps in compiled code (see `pbcs_ompl.planners.compiled`)."""
@@ -107,7 +108,7 @@ class Rides(Strategy):
         self.regions = reserve(self.regions, count, 1)
         written, reached = rides_loop.explore(
             step.parameters, feature_dims, self._bounds, tree.columns, len(tree), count, self.regions, self._size,
-            self.context.episode_steps, self._yields, self._rides, self._actions, self.rng)
+            self._limits, self._yields, self._rides, self._actions, self.rng)
         tree.claim(written)
         return len(tree) - 1 if reached else -1
 

@@ -39,17 +39,20 @@ class Ranking:
 class PlainRides:
     """One ride after the other: `next_step` says where to apply which control, `take_step` takes the result."""
 
-    def __init__(self, features, bin_size, low, high, rng, longest, scales=5):
+    def __init__(self, features, bin_size, low, high, rng, longest, scales=5, known=2, still=True, kinds=(0, 1),
+                 learns=("scale", "kind", "patience")):
         self.features, self.bin_size, self.low, self.high, self.rng = features, bin_size, low, high, rng
         self.longest, self.regions = longest, [{} for _ in range(scales)]
         self.rankings = [Ranking() for _ in range(scales)]
         self.opened = {"scale": np.ones(scales), "kind": np.ones(2), "patience": np.ones(6)}
         self.used = {question: np.ones(len(answers)) for question, answers in self.opened.items()}
-        self.riding = False
+        self.riding, self.most_known, self.still, self.kinds, self.learns = False, known, still, kinds, learns
 
     def choose(self, question):
         squared = (self.opened[question] / self.used[question]) ** 2
         weights = squared * squared
+        if question == "kind":
+            weights = np.where(np.isin((0, 1), self.kinds), weights, 0.0)
         rest = self.rng.random() * sum(weights.tolist())
         for answer, weight in enumerate(weights[:-1].tolist()):
             rest -= weight
@@ -129,10 +132,12 @@ class PlainRides:
             self.dry = 0 if opened else self.dry + 1
             self.known = 0 if opened else self.known + (region is not self.bin)
             self.node, self.bin = node, region
-            over = (not moved or self.known >= 2 or self.dry >= 2 ** self.chosen["patience"]
-                    or self.steps >= self.longest)
+            over = ((self.still and not moved) or self.known >= self.most_known
+                    or self.dry >= 2 ** self.chosen["patience"] or self.steps >= self.longest)
         if over:
             self.riding = False
             for question, answer in self.chosen.items():
+                if question not in self.learns:
+                    continue
                 self.opened[question][answer] += self.gains
                 self.used[question][answer] += self.steps

@@ -1,10 +1,13 @@
 """Shorter plans, by resets and steps alone: any time, every result a real trajectory.
 
-Two moves make a new plan of the best one so far. A *pull* drives from the start along the plan as along a rope that is
-pulled tight: it aims at the last state of the plan within reach. Where a ride towards that state ends beside it, the
-next ride begins there; reach doubles with every ride that does, and halves with every one that does not. So loops are
-left out and corners are cut wherever the environment lets a ride through. A *cut* leaves out some of the controls, and
-replays the rest. Which move is made next is decided by what both have saved for their transitions so far.
+Three moves make a new plan of the best one so far. Where a step can lead to any state nearby, *short cuts* leave the
+plan at one state and join it at another, exactly, so that the plan behind needs no new steps; which are tried is
+decided by what the search has seen of free space (see `free_space`). A *pull* drives from the start along the plan as
+along a rope that is pulled tight: it aims at the last state of the plan within reach. Where a ride towards that state
+ends beside it, the next ride begins there; reach doubles with every ride that does, and halves with every one that does
+not. So loops are left out and corners are cut wherever the environment lets a ride through. A *cut* leaves out some of
+the controls, and replays the rest. Short cuts come first, while they save anything; then one of the other two, that
+which has saved more for its transitions so far.
 """
 
 import time
@@ -14,6 +17,9 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from pbcs_ompl.bridge.free_motion import FreeMotion
+from pbcs_ompl.bridge.free_space import FreeSpace, ShortCut
+from pbcs_ompl.bridge.growing_path import GrowingPath
 from pbcs_ompl.bridge.steering import Steering
 from pbcs_ompl.bridge.trajectory import Trajectory, from_controls
 from pbcs_ompl.core.callbacks import check_finite, code_of_others
@@ -21,7 +27,7 @@ from pbcs_ompl.core.errors import BudgetUsedUp, InvalidOption
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.tree import Tree
-from pbcs_ompl.core.types import Array, Counter
+from pbcs_ompl.core.types import Array, Counter, Transition
 
 BESIDE = 0.75
 """Bins from a state of the plan at which a ride has succeeded."""
@@ -29,8 +35,14 @@ FIRST_REACH, MOST_REACH = 8.0, 64.0
 """Bins within which a ride aims at a state of the plan."""
 PATIENCE = 3
 """Steps of a ride without coming closer, after which it has failed."""
-MOST_LEARNT = 4096
-"""Transitions of the search that the steering is fitted to."""
+MOST_LEARNT, MOST_SEEN = 4096, 1 << 15
+"""Transitions of the search that the dynamics are fitted to, and from which free space is known."""
+MOST_FAILED = 3
+"""How often in a row short cuts may save nothing until something else is tried."""
+MOST_ROUNDED = 2
+"""Steps more than planned that a short cut may need to join the plan to the last bit."""
+MOST_ENDS = 128
+"""States of the plan at which short cuts may begin or end."""
 LONGEST_REPLAY = 8
 """Steps of the plan that are tried where no ride succeeds."""
 
@@ -86,27 +98,6 @@ class Improvement:
     progress: dict[str, list[Any]] = field(default_factory=dict)
 
 
-
-@dataclass
-class _Path:
-    """States [T+1, D], controls [T, A] and rewards [T], as lists that grow at their end."""
-
-    states: list[Array]
-    controls: list[Array] = field(default_factory=list)
-    rewards: list[float] = field(default_factory=list)
-
-    def __len__(self) -> int:
-        return len(self.controls)
-
-    def first(self, steps: int) -> "_Path":
-        """Return a copy of the first steps."""
-        return _Path(self.states[:steps + 1], self.controls[:steps], self.rewards[:steps])
-
-    def cut_to(self, steps: int) -> None:
-        """Keep the first steps."""
-        del self.states[steps + 1:], self.controls[steps:], self.rewards[steps:]
-
-
 class _Anchor(NamedTuple):
     """A place that a pull has come to: its steps, the plan's state beside it, and the last state to aim at."""
 
@@ -136,9 +127,10 @@ class _Improver:
     def __init__(self, trajectory: Trajectory, model: ResettableModel, allowance: Allowance, rng: np.random.Generator,
                  tree: Tree | None):
         self._given, self._model, self._allowance, self._rng, self._tree = trajectory, model, allowance, rng, tree
-        self._best = _Path(list(trajectory.states), list(trajectory.controls), trajectory.rewards.tolist())
+        self._best = GrowingPath(list(trajectory.states), list(trajectory.controls), trajectory.rewards.tolist())
         self._counter, self._began = Counter(allowance.transitions), time.perf_counter()
         self._at_goal, self._pulled = False, False
+        self._motion: FreeMotion | None = None
         self._progress: dict[str, list[Any]] = {"transitions": [], "seconds": [], "length": []}
 
     def run(self) -> tuple[Trajectory, Improvement]:
@@ -147,8 +139,10 @@ class _Improver:
         saved, spent = {self._pull: 1.0, self._cut: 1.0}, {self._pull: 1.0, self._cut: float(len(self._best) + 1)}
         try:
             with code_of_others():
-                self._steering = self._learnt()
+                if len(self._best) > 1:  # a tree without a transition shows nothing
+                    self._learn()
                 while len(self._best) > 1 and self._counter.left:
+                    self._cut_short()
                     move = max(saved, key=lambda one: saved[one] / spent[one])
                     before, made = len(self._best), self._counter.count
                     try:
@@ -165,16 +159,81 @@ class _Improver:
         return from_controls(self._model, np.array(best.states), np.array(best.controls), np.array(best.rewards),
                              planner=given.planner, seed=given.seed, reset_seed=given.reset_seed), found
 
-    def _learnt(self) -> Steering:
-        """Return the steering that the search has shown."""
+    def _learn(self) -> None:
+        """Learn how controls work, and what is free, from what the search has shown."""
         given, tree = self._given, self._tree
-        states, controls, after = given.states[:-1], given.controls, given.states[1:]
+        nodes = np.empty(0, np.int64)
         if tree is not None and tree.has_controls:
             nodes = np.flatnonzero(tree.parents >= 0)
-            nodes = nodes[::-(-len(nodes) // MOST_LEARNT)]
-            states = np.vstack([states, tree.states[tree.parents[nodes]]])
-            controls, after = np.vstack([controls, tree.controls[nodes]]), np.vstack([after, tree.states[nodes]])
-        return Steering(self._model, states, controls, after)
+        states, controls, after = given.states[:-1], given.controls, given.states[1:]
+
+        def shown(most: int) -> tuple[Array, Array, Array]:
+            if tree is None or not len(nodes):
+                return states, controls, after
+            some = nodes[::-(-len(nodes) // most)]
+            return (np.vstack([states, tree.states[tree.parents[some]]]), np.vstack([controls, tree.controls[some]]),
+                    np.vstack([after, tree.states[some]]))
+
+        self._steering = Steering(self._model, *shown(MOST_LEARNT))
+        self._motion = FreeMotion.shown_by(self._model, *shown(MOST_LEARNT))
+        if self._motion is not None:
+            self._space = FreeSpace(self._motion, *shown(MOST_SEEN))
+
+    def _cut_short(self) -> None:
+        """Where the motion is free, try short cuts until several times none has saved anything."""
+        motion, failed = self._motion, 0
+        while motion is not None and failed < MOST_FAILED and self._counter.left and len(self._best) > 1:
+            before, states = len(self._best), np.array(self._best.states)
+            self._splice(self._driven(motion, self._short_cuts(states), states))
+            failed = 0 if len(self._best) < before else failed + 1
+
+    def _short_cuts(self, states: Array) -> list[ShortCut]:
+        """Return short cuts that are likely free; where not all can be afforded, those that save most for a step."""
+        end = len(states) - 1
+        index = np.arange(end + 1)
+        if end > MOST_ENDS:
+            index = np.unique([0, end, *self._rng.choice(end, MOST_ENDS, replace=False)])
+        chosen, left = [], self._counter.left
+        for cut in sorted(self._space.short_cuts(states, index), key=lambda one: one.steps / (one.last - one.first)):
+            if cut.steps <= left:
+                chosen.append(cut)
+                left -= cut.steps
+        return chosen
+
+    def _driven(self, motion: FreeMotion, cuts: list[ShortCut], states: Array) -> list[tuple[ShortCut, GrowingPath]]:
+        """Drive along short cuts side by side; return those that came through, each with its path."""
+        paths, made = [GrowingPath([states[cut.first]]) for cut in cuts], []
+        through, going, taken = [], np.arange(len(cuts)), 0
+        first, last, steps = np.array(cuts, np.int64).reshape(-1, 3).T
+        here, there = states[first], states[last]
+        while len(going) and self._counter.left >= len(going):
+            controls = motion.controls(here, there[going], np.maximum(steps[going] - taken, 1))
+            outcome = self._advance(here, controls)
+            made.append((here, controls, outcome.states))
+            joined = (outcome.states == there[going]).all(axis=1) | outcome.success
+            on = motion.is_free(here, controls, outcome.states) & ~outcome.ended
+            taken += 1
+            for row in np.flatnonzero(joined | on).tolist():
+                paths[going[row]].append(outcome, controls, row)
+            for row in np.flatnonzero(joined & (on | outcome.success)).tolist():
+                cut, path = cuts[going[row]], paths[going[row]]
+                joint = len(self._best) if outcome.success[row] else cut.last
+                through.append((ShortCut(cut.first, joint, len(path)), path))
+            on &= ~joined & (taken < steps[going] + MOST_ROUNDED)  # what rounding has left is a step more
+            here, going = outcome.states[on], going[on]
+        if made:
+            self._space.note(*map(np.concatenate, zip(*made, strict=True)), certain=True)
+        return through
+
+    def _splice(self, through: list[tuple[ShortCut, GrowingPath]]) -> None:
+        """Put paths in place of the parts of the best plan that they cut short, the last first."""
+        best, begin = self._best, len(self._best) + 1
+        for cut, path in sorted(through, key=lambda one: (one[0].first, one[0].last), reverse=True):
+            if cut.last == len(self._best):  # the goal is reached: what was found behind it is not needed
+                best, begin = self._best.spliced(cut, path), cut.first
+            elif cut.last <= begin:
+                best, begin = best.spliced(cut, path), cut.first
+        self._keep(best)
 
     def _pull(self) -> None:
         """Drive along the best plan from one of its states, aiming as far ahead as rides succeed."""
@@ -217,7 +276,7 @@ class _Improver:
         near = np.flatnonzero(np.abs(ahead - self._features(state[None])).max(axis=1) <= reach)
         return index + 1 + int(near[-1]) if len(near) else None
 
-    def _ride(self, path: _Path, target: Array, most: int, *, to_goal: bool) -> bool:
+    def _ride(self, path: GrowingPath, target: Array, most: int, *, to_goal: bool) -> bool:
         """Drive on towards a feature in bins [F], for at most some steps; return whether it was reached, else undo."""
         first, least, waited = len(path), np.inf, 0
         for _ in range(most + PATIENCE * to_goal + 1):
@@ -235,7 +294,7 @@ class _Improver:
         path.cut_to(first)
         return False
 
-    def _replay(self, path: _Path, plan: _Path, rope: Array, index: int) -> int | None:
+    def _replay(self, path: GrowingPath, plan: GrowingPath, rope: Array, index: int) -> int | None:
         """Apply some of the plan's own controls; return the index they led next to, else undo and return None."""
         first, steps = len(path), int(self._rng.integers(1, LONGEST_REPLAY + 1))
         for control in plan.controls[index:index + steps]:
@@ -269,33 +328,40 @@ class _Improver:
         low, high = self._model.action_low, self._model.action_high
         return np.clip((low + high) / 2.0 + (high - low) * self._rng.uniform(-1.0, 1.0, len(low)), low, high)
 
-    def _step(self, path: _Path, control: Array) -> bool:
+    def _step(self, path: GrowingPath, control: Array) -> bool:
         """Make one step from the end of a path and append it; return False, and append none, where an episode ends.
 
         Raises:
             BudgetUsedUp: nothing is left of the allowance.
         """
-        seconds = self._allowance.seconds
-        if seconds is not None and time.perf_counter() - self._began >= seconds:
-            raise BudgetUsedUp(f"{seconds} seconds are over")
-        self._counter.spend(1)
         before = path.states[-1][None]
-        outcome = self._model.transition(before, control[None])
-        check_finite(before, control[None], outcome.states)
+        outcome = self._advance(before, control[None])
         self._at_goal = bool(outcome.success[0])
         if outcome.ended[0] and not self._at_goal:
             return False
-        path.states.append(outcome.states[0])
-        path.controls.append(control)
-        path.rewards.append(float(outcome.rewards[0]))
+        path.append(outcome, control[None], 0)
         return True
+
+    def _advance(self, states: Array, controls: Array) -> Transition:
+        """Return what follows from states [B, D] under controls [B, A].
+
+        Raises:
+            BudgetUsedUp: less is left of the allowance.
+        """
+        seconds = self._allowance.seconds
+        if seconds is not None and time.perf_counter() - self._began >= seconds:
+            raise BudgetUsedUp(f"{seconds} seconds are over")
+        self._counter.spend(len(states))
+        outcome = self._model.transition(states, controls)
+        check_finite(states, controls, outcome.states)
+        return outcome
 
     def _features(self, states: Array) -> Array:
         """Return the features [B, F] of states [B, D], in bins."""
         scaled: Array = self._model.feature(states) / self._model.bin_size
         return scaled
 
-    def _keep(self, path: _Path) -> None:
+    def _keep(self, path: GrowingPath) -> None:
         if len(path) < len(self._best):
             self._best = path
             self._note()

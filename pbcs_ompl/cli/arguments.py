@@ -16,7 +16,7 @@ FORMATS = ("numpy", "onnx", "sb3", "minari", "maniskill", "planner-arena", "csv"
 SHELLS = ("bash", "zsh", "fish")
 DESCRIPTION = """\
 Plan with OMPL in any environment that can be reset,
-then train a chain of skills along the plan.
+then train a controller along the plan.
 """
 EPILOG = """\
 examples:
@@ -160,11 +160,11 @@ def _plan(verb: Parser) -> None:
 
 
 def _train(verb: Parser) -> None:
-    """plan a trajectory, then train a chain of skills along it"""
+    """plan a trajectory, then train a controller along it"""
     _add_environment(verb, required=False)
-    verb.add_argument("--method", default="pbcs", metavar="NAME",
-                      help="pbcs, follow, pb, backplay, plain, bootstrapped or offline (pbcs)")
-    _add_planner(verb, None, "Ex, of follow Rides; none beside --path")
+    verb.add_argument("--method", metavar="NAME", help="pbcs, follow, pb, backplay, plain, bootstrapped or offline "
+                                                       "(follow; with --preset thesis pbcs)")
+    _add_planner(verb, None, "Rides for follow, else Ex; none beside --path")
     verb.add_argument("--agent", default="ddpg", metavar="NAME", help="registered, or module:Class (ddpg)")
     verb.add_argument("--device", default="cpu", metavar="NAME", help="where the agent learns: cpu or cuda (cpu)")
     verb.add_argument("--preset", default="fast", metavar="NAME",
@@ -190,7 +190,7 @@ def _train(verb: Parser) -> None:
 
 
 def _eval(verb: Parser) -> None:
-    """run a trained chain of skills, or a robot's follower, many times from the start"""
+    """run a trained controller many times from the start"""
     verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train, or ant: the follower that comes with pbcs")
     verb.add_argument("--path", metavar="DIR", help="of a follower: the plan to drive along, a folder of pbcs plan")
     verb.add_argument("--env", metavar="ID", help="of a follower, without --path: drive the shortest way to the goal")
@@ -275,7 +275,7 @@ def _export(verb: Parser) -> None:
 
 
 def _distill(verb: Parser) -> None:
-    """train one network to do what a chain of skills does"""
+    """train one network to do what a controller of several does"""
     verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train")
     verb.add_argument("--settings", type=json_object, default={}, metavar="JSON",
                       help="settings that differ from the defaults, such as '{\"width\": 64}'")
@@ -304,11 +304,11 @@ def _agents(verb: Parser) -> None:
 def _settings(verb: Parser) -> None:
     """list the settings of a preset for a training method, and what they mean"""
     verb.add_argument("preset", nargs="?", default="fast", metavar="PRESET", help="fast or thesis (fast)")
-    verb.add_argument("--method", default="pbcs", metavar="NAME", help="the training method (pbcs)")
+    verb.add_argument("--method", metavar="NAME", help="the training method (that of the preset)")
 
 
 def _demo(verb: Parser) -> None:
-    """plan in a 5x5 maze, train a chain of skills along the plan, show the result"""
+    """plan in a 5x5 maze, train a controller along the plan, show the result"""
     _add_out(verb)
 
 

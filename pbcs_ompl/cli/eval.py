@@ -1,4 +1,4 @@
-"""`pbcs eval`: run a trained chain of skills many times from the start."""
+"""`pbcs eval`: run a trained controller many times from the start."""
 
 from argparse import Namespace
 from contextlib import nullcontext

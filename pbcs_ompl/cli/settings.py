@@ -12,12 +12,13 @@ def run(arguments: Namespace) -> int:
     """List them, group by group."""
     try:
         from pbcs_ompl.skills.config import method_settings
-        from pbcs_ompl.skills.settings import Settings
+        from pbcs_ompl.skills.settings import Settings, read_preset
     except ModuleNotFoundError as error:
         raise MissingDependency(MISSING_TORCH) from error
-    chosen = method_settings(arguments.method, arguments.preset)
+    method = arguments.method or read_preset(arguments.preset)["method"]
+    chosen = method_settings(method, arguments.preset)
     groups: dict[str, Any] = {name: value for name, value in vars(chosen).items() if isinstance(value, Settings)}
-    found = {name: _described(group) for name, group in {arguments.method: chosen, **groups}.items()}
+    found = {name: _described(group) for name, group in {method: chosen, **groups}.items()}
     print_list({name: one for name, one in found.items() if one["options"]}, as_json=arguments.json)
     return 0
 

@@ -1,4 +1,4 @@
-"""`pbcs train`: plan a trajectory, train a chain of skills along it, draw both."""
+"""`pbcs train`: plan a trajectory, train a controller along it, draw both."""
 
 from argparse import Namespace
 from contextlib import nullcontext
@@ -45,7 +45,8 @@ def run(arguments: Namespace) -> int:
             raise InvalidOption("--worlds goes with --lines random")
         if arguments.env is None:
             raise InvalidOption("--env is missing (see pbcs train --help)")
-        out = Path(arguments.out or fresh_folder("train", arguments.env, arguments.method, arguments.seed))
+        named = [] if arguments.method is None else [arguments.method]
+        out = Path(arguments.out or fresh_folder("train", arguments.env, *named, arguments.seed))
     try:
         result = _train(arguments, out)
     except KeyboardInterrupt as error:
@@ -110,9 +111,13 @@ def _draw(result: dict[str, Any], chain: TrainedController | None, trajectory: T
         return
     model = make(chain.environment)
     rollout = chain.rollout(model) if result["complete"] else None
-    title = (f"{model.spec.id}: {chain.num_policies} skills, "
+    title = (f"{model.spec.id}: {_policies(chain)}, "
              f"{result['train_transitions']:,} transitions, {result['updates']:,} updates")
     draw_chain(model, chain, None if trajectory is None else trajectory.states, rollout, title, out)
+
+
+def _policies(chain: TrainedController) -> str:
+    return "1 policy" if chain.num_policies == 1 else f"{chain.num_policies} policies"
 
 
 def _names_modules(arguments: Namespace) -> bool:
@@ -126,7 +131,7 @@ def _closing_lines(arguments: Namespace, result: TrainResult, out: Path) -> list
               f"{format_number(result.updates)} updates, {format_duration(result.seconds)}")
     lines = [("solved" if result.solved else "not solved", effort)]
     if result.chain is not None:
-        lines.append(("chain", f"{result.chain.num_policies} skills"))
+        lines.append(("policies", str(result.chain.num_policies)))
     if result.nominal is not None and result.nominal.steps_median is not None:
         lines.append(("rollout", f"{format_number(result.nominal.steps_median)} steps to the goal without noise"))
     if result.robust is not None:

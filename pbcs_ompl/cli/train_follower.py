@@ -45,7 +45,7 @@ def run(arguments: Namespace) -> int:
 def _check(arguments: Namespace) -> None:
     if arguments.env is None:
         raise InvalidOption("--env is missing (see pbcs train --help)")
-    if arguments.method != "follow":
+    if arguments.method not in (None, "follow"):
         raise InvalidOption(f"--lines goes with --method follow, not with {arguments.method!r}")
     for name, value in FIXED.items():
         if getattr(arguments, name) != value:

@@ -1,4 +1,4 @@
-"""A skill chain: trajectory of phase 1, rollout of the chain, activation sets ([Matheron2020] Fig. 7.4)."""
+"""A trained controller: the plan, its rollout, the activation sets of a chain ([Matheron2020] Fig. 7.4)."""
 
 from collections.abc import Sequence
 
@@ -36,7 +36,7 @@ def draw_chain(axes: Axes, model: ResettableModel, *, trajectory: Array | None, 
                   label=f"planned, {len(trajectory) - 1} steps")
     if rollout is not None:
         draw_line(axes, project_2d(model, rollout), color=GREEN, linewidth=2, zorder=4,
-                  label=f"skill chain, {len(rollout) - 1} steps")
+                  label=f"controller, {len(rollout) - 1} steps")
     label: str | None = f"{len(activations)} activation set{'s' if len(activations) > 1 else ''}"
     for centre, radius in activations:
         x, y = project_2d(model, centre)[0]

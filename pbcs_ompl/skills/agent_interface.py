@@ -78,6 +78,12 @@ class SettingsType(Protocol):
         ...
 
 
+class AgentFactory(Protocol):
+    """Builds an agent, a stack of one, from a seed; `horizon` times as far-sighted as its settings say."""
+
+    def __call__(self, seed: int, horizon: float = 1.0) -> Agent: ...
+
+
 class AgentClass(Protocol):
     """What is registered as an agent, or named as module:Class: it builds an `Agent`."""
 
@@ -85,6 +91,20 @@ class AgentClass(Protocol):
 
     def __call__(self, observation_size: int, action_low: Array, action_high: Array, *, settings: Any,
                  seeds: Sequence[int], device: str) -> Agent: ...
+
+
+def far_sighted(settings: AgentSettingsValues, kind: SettingsType, horizon: float) -> AgentSettingsValues:
+    """Return settings whose horizon 1 / (1 - discount) is longer; those without a discount as they are.
+
+    Args:
+        settings: Those of an agent.
+        kind: Their type.
+        horizon: How many times longer.
+    """
+    values = settings.to_dict()
+    if horizon == 1.0 or "discount" not in values:
+        return settings
+    return kind.from_dict(values | {"discount": 1.0 - (1.0 - values["discount"]) / horizon})
 
 
 METHODS = tuple(name for name in vars(Agent) if not name.startswith("_"))

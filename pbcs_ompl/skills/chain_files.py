@@ -127,7 +127,7 @@ def read_chain(folder: Path, kind: str, *, trust: bool) -> ChainContent:
     path = folder / STRUCTURE
     found = kind_in(folder)
     if found != kind:
-        raise DamagedFile(f"{path} is that of a {found}, not of a {kind}; read it with pbcs_ompl.skills.load_chain")
+        raise DamagedFile(f"{path} is that of a {found}, not of a {kind}; read it with pbcs_ompl.load_chain")
     words = read_json(path, dict[str, Any])
     if words.get("version") != VERSION:
         raise DamagedFile(f"{path} has version {words.get('version')}, expected {VERSION}")

@@ -18,7 +18,7 @@ from pbcs_ompl.core.trust import config_modules, refuse_modules
 from pbcs_ompl.results import schema
 from pbcs_ompl.results.files import read_toml
 from pbcs_ompl.results.schema import check
-from pbcs_ompl.skills.agent_interface import Agent, AgentSettingsValues, load_agent
+from pbcs_ompl.skills.agent_interface import Agent, AgentFactory, AgentSettingsValues, far_sighted, load_agent
 from pbcs_ompl.skills.method import TrainingMethod
 from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings
 from pbcs_ompl.skills.pbcs import PBCS, PBCSSettings
@@ -85,7 +85,7 @@ def method_settings(method: str, preset: str = "fast", changes: Mapping[str, Any
         InvalidOption: the method has no such setting, or a value of the wrong type or out of its range.
     """
     entry, tables = find_method(method), read_preset(preset)
-    check_names(f"preset {preset!r}", "table", tables.keys() - {"version"}, {"common", *METHODS})
+    check_names(f"preset {preset!r}", "table", tables.keys() - {"version", "method"}, {"common", *METHODS})
     _check_settings(method, flat_names(changes or {}))
     defaults = entry.settings().updated(tables.get("common", {}) | tables.get(method, {}))
     return defaults.updated(changes or {})
@@ -144,7 +144,7 @@ class TrainConfig:
         choose_device(self.device)
 
     @classmethod
-    def resolve(cls, *, method: str, planner: str | None, planner_kwargs: Mapping[str, Any] | None, agent: str,
+    def resolve(cls, *, method: str | None, planner: str | None, planner_kwargs: Mapping[str, Any] | None, agent: str,
                 preset: str, settings: Mapping[str, Any] | None, agent_settings: Mapping[str, Any] | None, seed: int,
                 max_transitions: int, device: str, planned: bool) -> "TrainConfig":
         """Return the configuration that these choices of `train` stand for.
@@ -155,6 +155,7 @@ class TrainConfig:
         Raises:
             UnknownName, InvalidOption: see the class; also a planner or a trajectory that is not used.
         """
+        method = read_preset(preset)["method"] if method is None else method
         entry = find_method(method)
         needs_plan = entry.needs_plan
         if not needs_plan and (planned or planner is not None or planner_kwargs):
@@ -194,10 +195,15 @@ class TrainConfig:
         except (KeyError, TypeError, AttributeError, InvalidOption) as error:
             raise DamagedFile(f"not the configuration of a training: {error}") from error
 
-    def agent_factory(self, model: ResettableModel) -> Callable[[int], Agent]:
+    def agent_factory(self, model: ResettableModel) -> AgentFactory:
         """Return a function that builds an agent for `model` from a seed."""
         kind, spaces = load_agent(self.agent), self.settings.agent_spaces(model)
-        return lambda seed: kind(*spaces, settings=self.agent_settings, seeds=(seed,), device=self.device)
+
+        def build(seed: int, horizon: float = 1.0) -> Agent:
+            settings = far_sighted(self.agent_settings, kind.settings_type, horizon)
+            return kind(*spaces, settings=settings, seeds=(seed,), device=self.device)
+
+        return build
 
 
 def read_config(path: Path, *, trust: bool = False) -> tuple[EnvSpec, TrainConfig, dict[str, str]]:

@@ -185,8 +185,10 @@ class PlanSettings(Settings):
             this number of steps (ours, not tuned: observations near the goal are of order one).
         preceding_waypoints: Waypoints before a start point from which random rollouts may begin (ours: as many as
             `rollout_steps`; with 0, training stalls at 52 % of a plan of Ex on MountainCarContinuous-v0, seed 0).
+        improve: Transitions that may make a plan shorter after the search, for each transition of the search (ours).
     """
 
+    improve: float = 0.0
     remove_loops: bool = False
     relative_observations: bool = False
     observation_horizon: int = 10
@@ -194,7 +196,7 @@ class PlanSettings(Settings):
 
     def _check_ranges(self) -> None:
         self._check_counts("observation_horizon")
-        self._check("at least 0", lambda value: value >= 0, "preceding_waypoints")
+        self._check("at least 0", lambda value: value >= 0, "improve", "preceding_waypoints")
 
 
 @dataclass(frozen=True)
@@ -260,7 +262,7 @@ def preset_names() -> list[str]:
 
 @cache
 def read_preset(name: str) -> dict[str, Any]:
-    """Return the tables of a preset and its "version", which grows whenever one of its values changes.
+    """Return the tables of a preset, its usual "method", and a "version" that grows whenever one of its values changes.
 
     Raises:
         UnknownName: no such preset; the message suggests the closest one.

@@ -1,4 +1,4 @@
-"""From an environment to a trained skill chain."""
+"""From an environment to a trained controller."""
 
 import warnings
 from dataclasses import replace
@@ -28,7 +28,7 @@ from pbcs_ompl.skills.training import Training, training_versions
 
 @checked
 def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: Trajectory | None = None,
-          method: str = "pbcs", agent: str = "ddpg", preset: str = "fast", settings: dict[str, Any] | None = None,
+          method: str | None = None, agent: str = "ddpg", preset: str = "fast", settings: dict[str, Any] | None = None,
           agent_settings: dict[str, Any] | None = None, planner: str | None = None,
           planner_kwargs: dict[str, Any] | None = None, env_kwargs: dict[str, Any] | None = None,
           goal: str | GoalRule | None = None, feature: str | FeatureRule | None = None, start_seed: int | None = None,
@@ -40,14 +40,15 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
     Args:
         env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model.
         trajectory: A plan made before.
-        method: "pbcs", "follow", "pb", "backplay", "plain", "bootstrapped" or "offline".
+        method: "pbcs", "follow", "pb", "backplay", "plain", "bootstrapped" or "offline"; None for that of the
+            preset: "follow" of "fast", "pbcs" of "thesis".
         agent: A registered agent, or module:Class.
         preset: Named settings of the method and of the agent: "fast" or "thesis".
         settings: Settings of the method that differ from the preset, by name ({"epsilon": 0.2}), by path
             ({"episodes.epsilon": 0.2}) or as tables.
         agent_settings: Settings of the agent that differ from the preset.
-        planner: A registered planner, or module:attribute; None for that of the method (Ex, of follow Rides), or where
-            nothing is planned.
+        planner: A registered planner, or module:attribute; None for that of the method (Rides of "follow", else Ex), or
+            where nothing is planned.
         planner_kwargs: Options of the planner.
         env_kwargs: Options of the environment, when `env` is an id.
         goal, feature, start_seed, reset_options, max_episode_steps: See `pbcs_ompl.make`.

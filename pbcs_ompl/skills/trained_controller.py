@@ -140,7 +140,7 @@ class TrainedController(ABC):
     def check_belongs_to(self, environment: EnvSpec) -> None:
         """Raise Mismatch when it was trained in another environment."""
         if not self.environment.same_as(environment):
-            raise Mismatch(f"the skill chain was trained in {self.environment}, not in {environment}")
+            raise Mismatch(f"the controller was trained in {self.environment}, not in {environment}")
 
     def rollouts(self, model: ResettableModel, starts: Array, *, epsilon: float = 0.0,
                  rng: np.random.Generator | None = None, max_steps: int | None = None,

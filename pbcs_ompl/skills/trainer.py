@@ -1,6 +1,5 @@
 """Trains one agent for one skill after another along the waypoints of a plan."""
 
-from collections.abc import Callable
 from math import ceil
 from typing import Any
 
@@ -9,7 +8,7 @@ import numpy as np
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
 from pbcs_ompl.skills.activation_sets import ActivationSet, ClassifierSet, ClassifierSettings, Target, learn_set
-from pbcs_ompl.skills.agent_interface import Agent
+from pbcs_ompl.skills.agent_interface import AgentFactory
 from pbcs_ompl.skills.chain import Skill
 from pbcs_ompl.skills.episodes import Act, Episodes, run_episodes
 from pbcs_ompl.skills.observed_sets import Entry, ObservedClassifier, observed_ball, observed_metric
@@ -25,14 +24,14 @@ class SkillTrainer:
     """Collects episodes, trains the agent on them, and tests it; counts every transition.
 
     Args:
-        make_agent: Builds an agent, a stack of one, from a seed.
+        make_agent: Builds an agent.
         waypoints: Where episodes start and skills end.
         settings: How episodes are run and learnt from.
         counter: Counts transitions.
         rng: Source of start states and exploration noise.
     """
 
-    def __init__(self, make_agent: Callable[[int], Agent], waypoints: Waypoints, settings: EpisodeSettings,
+    def __init__(self, make_agent: AgentFactory, waypoints: Waypoints, settings: EpisodeSettings,
                  counter: Counter, rng: np.random.Generator):
         self.make_agent = make_agent
         self.waypoints = waypoints
@@ -43,9 +42,10 @@ class SkillTrainer:
         self.updates_due = 0.0
         self.updates_before = 0
         self.agent_seed = int(rng.integers(2**31))
+        self.horizon = 1.0
         self.agent = make_agent(self.agent_seed)
         self.latest: dict[str, float] = {}
-        """Where the last session started, its success rate, and the losses of its updates: for those who look on."""
+        """Where the last session or test started, its success rate, the losses of updates: for those who look on."""
         self.set_target(waypoints.last)
 
     def set_target(self, end_index: int, target: Target | None = None) -> None:
@@ -61,11 +61,15 @@ class SkillTrainer:
         if not warm_start and self.agent.num_updates:
             self.restart()
 
-    def restart(self) -> None:
-        """Continue with new networks and an empty replay buffer."""
+    def restart(self, horizon: float = 1.0) -> None:
+        """Continue with new networks and an empty replay buffer.
+
+        Args:
+            horizon: How many times as far-sighted as its settings say the agent is from now on.
+        """
         self.updates_before += self.agent.num_updates
-        self.agent_seed = int(self.rng.integers(2**31))
-        self.agent = self.make_agent(self.agent_seed)
+        self.agent_seed, self.horizon = int(self.rng.integers(2**31)), horizon
+        self.agent = self.make_agent(self.agent_seed, horizon)
 
     @property
     def updates(self) -> int:
@@ -208,7 +212,7 @@ class SkillTrainer:
         """Return everything needed to resume bit for bit, as plain values and arrays."""
         plain = {"end_index": self.end_index, "rng": self.rng.bit_generator.state,
                  "transitions": self.counter.count, "updates_due": self.updates_due,
-                 "updates_before": self.updates_before, "agent_seed": self.agent_seed}
+                 "updates_before": self.updates_before, "agent_seed": self.agent_seed, "horizon": self.horizon}
         return plain, self.agent.state_dict()
 
     def restore(self, plain: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
@@ -219,7 +223,8 @@ class SkillTrainer:
         self.updates_due = plain["updates_due"]
         self.updates_before = plain["updates_before"]
         self.agent_seed = plain["agent_seed"]
-        self.agent = self.make_agent(self.agent_seed)
+        self.horizon = plain["horizon"]
+        self.agent = self.make_agent(self.agent_seed, self.horizon)
         self.agent.load_state_dict(arrays)
 
     def _observe(self, states: Array) -> Array:

@@ -114,17 +114,25 @@ class Training:
     def _search(self) -> tuple[Trajectory | None, int, str | None]:
         found = plan(self.model, self.config.planner, planner_kwargs=self.config.planner_kwargs,
                      seed=self.seeds.child("plan").integer(), max_transitions=self.config.max_transitions,
-                     on_progress=self._report_planning)
+                     improve=self._allowance, on_progress=self._report_planning)
+        transitions = found.transitions + (found.improvement.transitions if found.improvement else 0)
         if self.folder:
             config = read_toml(self.folder.path / CONFIG)
             self.folder.write_config(config | {"planner_kwargs": found.planner_settings})
         unverified = found.found and found.replay_ok is None
         if not (found.solved or unverified):
             reason = found.reason if found.found else "the planner found no path to the goal within the budget"
-            return None, found.transitions, reason
+            return None, transitions, reason
         if found.trajectory is not None:
-            self._keep_plan(found.trajectory, found.transitions)
-        return found.trajectory, found.transitions, None
+            self._keep_plan(found.trajectory, transitions)
+        return found.trajectory, transitions, None
+
+    @property
+    def _allowance(self) -> str | None:
+        """What making a plan shorter may use, for `plan`."""
+        settings = self.config.settings
+        share = settings.plan.improve if isinstance(settings, PlannedSettings) else 0.0
+        return f"{100 * share:g}%" if share else None
 
     def _keep_plan(self, trajectory: Trajectory, transitions: int) -> None:
         if self.path:

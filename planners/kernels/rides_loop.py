@@ -1,6 +1,6 @@
 """Rides: begin one, take note of each of its steps, and both in one compiled loop."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -23,9 +23,20 @@ SCALE, KIND, PATIENCE, ACTIVE, NODE, BIN, STEPS, DRY, KNOWN, GAINS = range(10)  
 KINDS, PATIENCES = 2, 6  # uniform and surface controls; 1, 2, 4, ... 32 steps
 OPENED, USED, WEIGHT = range(3)  # columns of `yields`
 NO_BIN: Number = np.int64(-1)
-MOST_KNOWN = 2
-"""The known bins in a row that end a ride."""
 
+
+class Limits(NamedTuple):
+    """What ends a ride, beside its patience and the end of the episode."""
+
+    steps: int
+    """The most steps."""
+    known: int = 2
+    """Known bins in a row."""
+    still: bool = True
+    """Whether a step that does not change the state does."""
+
+
+LIMITS_TYPE = types.NamedTuple((types.int64, types.int64, types.boolean), Limits)
 _matrix = types.float64[:, ::1]
 _vector = types.float64[::1]
 _integers = types.int64[::1]
@@ -115,7 +126,7 @@ def _end(yields: Array, rides: IndexArray, ride: int) -> None:
 
 @njit(inline="always")
 def _note(rides: IndexArray, ride: int, yields: Array, states: Array, node: Number, number: Number, opened: bool,
-            terminal: bool, longest: int) -> None:
+            terminal: bool, limits: Limits) -> None:
     """Take note that a ride has come to a node, in bin `number` unless it is terminal; end the ride where it ends."""
     rides[ride, STEPS] += 1
     if terminal:
@@ -128,11 +139,11 @@ def _note(rides: IndexArray, ride: int, yields: Array, states: Array, node: Numb
     else:
         rides[ride, DRY] += 1
         rides[ride, KNOWN] += crossed
-    moved = False
+    moved = not limits.still
     for axis in range(states.shape[1]):
         moved = moved or states[node, axis] != states[rides[ride, NODE], axis]
-    if (not moved or rides[ride, KNOWN] >= MOST_KNOWN or rides[ride, DRY] >= 1 << rides[ride, PATIENCE]
-            or rides[ride, STEPS] >= longest):
+    if (not moved or rides[ride, KNOWN] >= limits.known or rides[ride, DRY] >= 1 << rides[ride, PATIENCE]
+            or rides[ride, STEPS] >= limits.steps):
         _end(yields, rides, ride)
     else:
         rides[ride, NODE], rides[ride, BIN] = node, number
@@ -151,7 +162,7 @@ def begin(regions: Regions, yields: Array, bounds: Array, rides: IndexArray, act
 
 @njit(error_model="numpy")
 def note(regions: Regions, yields: Array, rides: IndexArray, count: int, columns: Columns, first: int, last: int,
-           bin_size: Array, longest: int) -> None:
+           bin_size: Array, limits: Limits) -> None:
     """Take note of the nodes first, ..., last - 1: roots, or what followed from the first `count` rides, in order.
 
     A ride from which nothing followed ends.
@@ -173,7 +184,7 @@ def note(regions: Regions, yields: Array, rides: IndexArray, count: int, columns
         while rides[ride, NODE] != parents[node]:
             _end(yields, rides, ride)
             ride += 1
-        _note(rides, ride, yields, states, node, number, opened, ends[node], longest)
+        _note(rides, ride, yields, states, node, number, opened, ends[node], limits)
         ride += 1
     if last > first and parents[first] >= 0:
         for silent in range(ride, count):
@@ -182,9 +193,9 @@ def note(regions: Regions, yields: Array, rides: IndexArray, count: int, columns
 
 @njit(types.Tuple((types.int64, types.boolean))(
     PARAMETERS_TYPE, _integers, _matrix, COLUMNS_TYPE, types.int64, types.int64, REGIONS_TYPE, _vector,
-    types.int64, types.float64[:, :, ::1], types.int64[:, ::1], _matrix, npy_rng), error_model="numpy")
+    LIMITS_TYPE, types.float64[:, :, ::1], types.int64[:, ::1], _matrix, npy_rng), error_model="numpy")
 def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
-            columns: Columns, first: int, most: int, regions: Regions, bin_size: Array, longest: int, yields: Array,
+            columns: Columns, first: int, most: int, regions: Regions, bin_size: Array, limits: Limits, yields: Array,
             rides: IndexArray, actions: Array, rng: np.random.Generator) -> tuple[int, bool]:
     """Ride, one ride after the other, for `most` steps, or until there is no space to open a bin.
 
@@ -195,7 +206,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
         columns, first: The tree's arrays, with space for `most` more nodes, and the number of nodes so far.
         most: How many steps.
         regions, bin_size: The regions, with space for `most` more nodes and a bin, and the edges of the bins [F].
-        longest: The most steps of a ride.
+        limits: What ends a ride.
         yields: Bins opened and steps used so far, and the weight [3, answers, 3], by scale, kind and patience.
         rides, actions: The first row of each is the ride in progress, and its control.
         rng: The random numbers.
@@ -231,7 +242,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
             if number < 0:
                 number, opened = open_bin(regions, cell), True
             add_node(rows, pool, free, used, number, child)
-        _note(rides, 0, yields, states, child, number, opened, terminal, longest)
+        _note(rides, 0, yields, states, child, number, opened, terminal, limits)
         if success:
             return child + 1 - first, True
     return most, False

@@ -48,16 +48,16 @@ def test_a_shorter_plan_is_one_and_its_numbers_are_true(env, planner, kwargs):
     assert again.states.tobytes() == trajectory.states.tobytes()
 
 
-@pytest.mark.parametrize("size", [5, 9])
-def test_plans_of_ex_come_close_to_the_shortest_with_a_tenth_of_its_transitions(size):
+@pytest.mark.parametrize("planner", ["Ex", "Rides"])
+def test_plans_come_close_to_the_shortest_with_a_tenth_of_the_transitions(planner):
     ratios = []
-    for seed in range(8):
-        kwargs = {"size": size, "maze_seed": seed}
-        found = plan("pbcs/Maze-v0", "Ex", env_kwargs=kwargs, seed=seed, improve="10%")
+    for seed in range(6):
+        kwargs = {"size": 7, "maze_seed": seed}
+        found = plan("pbcs/Maze-v0", planner, env_kwargs=kwargs, seed=seed, improve="10%")
         assert found.path_length is not None
         ratios.append(found.path_length / least_steps(MazeEnv(**kwargs)))
     assert min(ratios) >= 1.0
-    assert np.median(ratios) < 1.5
+    assert np.median(ratios) < 1.3
 
 
 def test_the_least_number_of_steps_of_a_straight_and_of_a_bent_way():

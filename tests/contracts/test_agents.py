@@ -239,7 +239,8 @@ def test_it_solves_a_bandit_and_values_it(entry):
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name == "sac" else [pytest.mark.slow])
                                   for name in registry.names("agent")])
 def test_it_trains_the_skills_of_the_2x2_maze(name, tmp_path):
-    result = train("pbcs/Maze-v0", env_kwargs={"size": 2}, agent=name, max_transitions=400_000, out=tmp_path / "run")
+    result = train("pbcs/Maze-v0", method="pbcs", env_kwargs={"size": 2}, agent=name, max_transitions=400_000,
+                   out=tmp_path / "run")
     assert result.solved
     chain, model = SkillChain.load(tmp_path / "run" / "chain"), open_model("pbcs/Maze-v0", {"size": 2})
     np.testing.assert_array_equal(chain.rollout(model, model.initial_state(0)),
@@ -252,7 +253,7 @@ def test_it_trains_the_skills_of_the_2x2_maze(name, tmp_path):
                                                                   InvalidOption, "'temperature'")])
 def test_a_training_that_cannot_begin_leaves_no_folder(options, error, match, tmp_path):
     with pytest.raises(error, match=match):
-        train("pbcs/Maze-v0", env_kwargs={"size": 2}, out=tmp_path / "run", **options)
+        train("pbcs/Maze-v0", method="pbcs", env_kwargs={"size": 2}, out=tmp_path / "run", **options)
     assert not (tmp_path / "run").exists()
 
 

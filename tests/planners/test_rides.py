@@ -13,6 +13,7 @@ from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.planners import Rides
 from pbcs_ompl.planners.kernels.ranking import REGIONS
 from pbcs_ompl.planners.kernels.regions import no_regions, open_bin, reserve
+from pbcs_ompl.planners.rides_without import PARTS, RidesWithout
 
 EXACT, TIMEOUT = ob.PlannerStatus.EXACT_SOLUTION, ob.PlannerStatus.TIMEOUT
 
@@ -20,7 +21,7 @@ EXACT, TIMEOUT = ob.PlannerStatus.EXACT_SOLUTION, ob.PlannerStatus.TIMEOUT
 def plain(model, seed, budget, **options):
     """Return states, parents and controls of the plain rule, from the same random numbers."""
     rule = PlainRides(len(model.bin_size), model.bin_size, model.action_low, model.action_high,
-                      SeedTree(seed).child("strategy").generator(), model.max_episode_steps, **options)
+                      SeedTree(seed).child("strategy").generator(), **{"longest": model.max_episode_steps} | options)
     states, parents, controls = [model.initial_state()], [-1], [np.zeros(len(model.action_low))]
     rule.root(0, states[0])
     for new in range(1, budget + 1):
@@ -50,6 +51,23 @@ def test_batch_1_and_compiled_are_the_plain_rule_to_the_last_bit(solve, square, 
         assert np.array_equal(planner.tree.states, states)
         assert np.array_equal(planner.tree.parents, parents)
         assert np.array_equal(planner.tree.controls, controls)
+
+
+CHANGES = {
+    "rides": {"longest": 1}, "scales": {"scales": 1}, "surface-controls": {"kinds": (0,)},
+    "uniform-controls": {"kinds": (1,)}, "stop-when-still": {"still": False}, "stop-in-known-bins": {"known": 50},
+    "learnt-scales": {"learns": ("kind", "patience")}}
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_without_a_part_it_is_the_plain_rule_without_it(solve, compiled_square, part):
+    whole, _, _ = plain(compiled_square(goal=9.0), 0, 1500)
+    states, parents, controls = plain(compiled_square(goal=9.0), 0, 1500, **CHANGES[part])
+    planner, _, _, _ = solve(lambda si: RidesWithout.build(si, seed=0, part=part), compiled_square(goal=9.0), 1500)
+    assert not np.array_equal(whole[0], states)
+    assert np.array_equal(planner.tree.states, states)
+    assert np.array_equal(planner.tree.parents, parents)
+    assert np.array_equal(planner.tree.controls, controls)
 
 
 def check_regions(regions, features):

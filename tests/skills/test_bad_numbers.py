@@ -79,5 +79,5 @@ class Lopsided(gymnasium.Env):
 
 def test_an_asymmetric_action_box_simply_works():
     gymnasium.register("tests/Lopsided-v0", entry_point=Lopsided, max_episode_steps=60)
-    result = train("tests/Lopsided-v0", seed=0, max_transitions=100_000)
+    result = train("tests/Lopsided-v0", method="pbcs", seed=0, max_transitions=100_000)
     assert result.solved

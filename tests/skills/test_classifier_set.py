@@ -124,13 +124,13 @@ class StopAfter:
 
 def test_training_with_learnt_sets_solves_the_small_maze_and_resumes_after_a_stop(tmp_path):
     options = {"env_kwargs": {"size": 2}, "seed": 1, "settings": {"activation": "classifier"}}
-    whole = train("pbcs/Maze-v0", **options)
+    whole = train("pbcs/Maze-v0", method="pbcs", **options)
     assert whole.solved
     later = [skill.activation for skill in whole.chain.skills[1:]]
     assert later
     assert all(type(part) is ClassifierSet for part in later)
     with pytest.raises(KeyboardInterrupt):
-        train("pbcs/Maze-v0", **options, out=tmp_path / "run", on_progress=StopAfter(skills=1))
+        train("pbcs/Maze-v0", method="pbcs", **options, out=tmp_path / "run", on_progress=StopAfter(skills=1))
     resumed = resume(tmp_path / "run")
     assert (resumed.train_transitions, resumed.updates) == (whole.train_transitions, whole.updates)
     for mine, theirs in zip(whole.chain.skills, resumed.chain.skills, strict=True):

@@ -13,7 +13,7 @@ from pbcs_ompl.skills import resume, train
 from pbcs_ompl.skills.training import training_versions
 
 MAZE = {"size": 2}
-OPTIONS = {"env_kwargs": MAZE, "seed": 1}
+OPTIONS = {"method": "pbcs", "env_kwargs": MAZE, "seed": 1}
 CHANGED_PRESETS = """
 import json, sys
 from pbcs_ompl.agents import settings as agents

@@ -23,7 +23,7 @@ def build(method, name, **changes):
     prefill = {"prefill_transitions": 500} if issubclass(method, Bootstrapped) else {}
     settings = method_settings(name, "fast", prefill | {"beta": 4} | changes)
 
-    def agent(seed):
+    def agent(seed, horizon=1.0):
         return DDPG(MODEL.observation_size, MODEL.action_low, MODEL.action_high, seeds=(seed,),
                     settings=DDPGSettings.from_preset("fast"))
 

@@ -38,7 +38,7 @@ def fingerprint(result):
 
 
 def test_pbcs_solves_the_small_maze(tmp_path):
-    result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, out=tmp_path / "run")
+    result = train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, seed=0, out=tmp_path / "run")
     assert result.solved
     assert result.robust.success_rate >= 0.95
     assert {path.name for path in (tmp_path / "run").iterdir()} == {
@@ -53,9 +53,9 @@ def test_pbcs_solves_the_small_maze(tmp_path):
 
 def test_the_same_seed_gives_the_same_chain_in_a_fresh_process(tmp_path):
     script = ("import sys; from pbcs_ompl.skills import train; "
-              "train('pbcs/Maze-v0', env_kwargs={'size': 2}, seed=5, out=sys.argv[1])")
+              "train('pbcs/Maze-v0', method='pbcs', env_kwargs={'size': 2}, seed=5, out=sys.argv[1])")
     subprocess.run([sys.executable, "-c", script, str(tmp_path / "other")], check=True)
-    mine = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=5)
+    mine = train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, seed=5)
     other = SkillChain.load(tmp_path / "other" / "chain")
     model = make("pbcs/Maze-v0", MAZE)
     np.testing.assert_array_equal(mine.chain.rollout(model, model.initial_state(0)),
@@ -77,10 +77,10 @@ class StopAfter:
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)])
 def test_a_training_that_was_stopped_or_killed_resumes_bit_for_bit(tmp_path, number):
     """A Ctrl-C may happen anywhere within a step, which is finished first; a kill goes back to the last checkpoint."""
-    whole = train("pbcs/Maze-v0", env_kwargs={"size": 3}, seed=1)
+    whole = train("pbcs/Maze-v0", method="pbcs", env_kwargs={"size": 3}, seed=1)
     script = ("import sys; from pbcs_ompl.skills import train, training; "
               "training.CHECKPOINT_SECONDS = training.FIRST_CHECKPOINT_SECONDS = 0.05; "
-              f"train('pbcs/Maze-v0', env_kwargs={{'size': 3}}, seed=1, out={str(tmp_path / 'run')!r}, "
+              f"train('pbcs/Maze-v0', method='pbcs', env_kwargs={{'size': 3}}, seed=1, out={str(tmp_path / 'run')!r}, "
               "on_progress=lambda numbers: print(numbers, flush=True))")
     child = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
                              text=True)
@@ -112,7 +112,7 @@ def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, method, budget):
 
 def test_a_stop_while_a_link_is_trained_again_resumes_bit_for_bit(tmp_path):
     """An impossible standard of verification keeps the chain open until the budget ends."""
-    options = {"env_kwargs": MAZE, "seed": 2, "max_transitions": 150_000,
+    options = {"method": "pbcs", "env_kwargs": MAZE, "seed": 2, "max_transitions": 150_000,
                "settings": {"verify": True, "epsilon": 0.9, "test_epsilon": 0.0}}
     first = train("pbcs/Maze-v0", **options)
     with pytest.raises(KeyboardInterrupt):
@@ -123,7 +123,7 @@ def test_a_stop_while_a_link_is_trained_again_resumes_bit_for_bit(tmp_path):
 
 
 def test_a_budget_ends_a_training_with_what_was_learnt_and_a_larger_one_continues(tmp_path):
-    result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, max_transitions=3000, out=tmp_path / "run")
+    result = train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, seed=0, max_transitions=3000, out=tmp_path / "run")
     assert (result.solved, result.complete, result.nominal) == (False, False, None)
     assert "budget of 3000" in result.reason
     assert result.trajectory is not None
@@ -132,14 +132,14 @@ def test_a_budget_ends_a_training_with_what_was_learnt_and_a_larger_one_continue
 
 
 def test_a_goal_that_the_planner_does_not_reach_is_the_reason(tmp_path):
-    result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, max_transitions=50, out=tmp_path / "run")
+    result = train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, seed=0, max_transitions=50, out=tmp_path / "run")
     assert (result.solved, result.chain) == (False, None)
     assert "no path to the goal" in result.reason
 
 
 def test_a_chain_that_misses_the_criterion_says_by_how_much():
     impossible = {"robust_epsilon": 1.0, "robust_episodes": 20, "verify": False}
-    result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, settings=impossible)
+    result = train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, seed=0, settings=impossible)
     assert (result.solved, result.complete, result.robust.episodes) == (False, True, 20)
     assert result.reason == (f"{result.robust.successes} of 20 executions with 100% random actions succeed, "
                              "expected 95%")
@@ -152,7 +152,7 @@ def test_the_plain_agent_does_not_need_a_plan():
 
 
 def test_the_thesis_preset_trains_with_its_own_networks_and_order():
-    result = train("pbcs/Maze-v0", env_kwargs=MAZE, preset="thesis", max_transitions=4000, seed=0,
+    result = train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, preset="thesis", max_transitions=4000, seed=0,
                    agent_settings={"hidden": [32, 32]})
     assert result.updates > 0
     assert len(result.waypoints) == result.trajectory.length + 1
@@ -160,24 +160,24 @@ def test_the_thesis_preset_trains_with_its_own_networks_and_order():
 
 def test_a_plan_made_before_is_used():
     found = plan("pbcs/Maze-v0", "Ex", env_kwargs=MAZE, seed=3)
-    result = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=3, trajectory=found.trajectory)
+    result = train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, seed=3, trajectory=found.trajectory)
     assert result.solved
     assert result.plan_transitions == 0
     with pytest.raises(Mismatch):
-        train("pbcs/Maze-v0", env_kwargs={"size": 3}, trajectory=found.trajectory)
+        train("pbcs/Maze-v0", method="pbcs", env_kwargs={"size": 3}, trajectory=found.trajectory)
 
 
 def test_the_planner_can_be_chosen_and_the_folder_says_which(tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        train("pbcs/Maze-v0", env_kwargs=MAZE, seed=0, planner="KPIECE1", planner_kwargs={"control_duration": 2},
-              out=tmp_path / "run", on_progress=StopAfter(1))
+        train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, seed=0, planner="KPIECE1",
+              planner_kwargs={"control_duration": 2}, out=tmp_path / "run", on_progress=StopAfter(1))
     config = read_toml(tmp_path / "run" / "config.toml")
     assert (config["planner"], config["planner_kwargs"]) == ("KPIECE1", {"control_duration": 2})
     found = Trajectory.load(tmp_path / "run" / "trajectory.npz")
     assert found.planner == "KPIECE1"
     for planner in ("KPIECE1", "Ex"):
         with pytest.raises(InvalidOption, match="remove planner"):
-            train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=found, planner=planner)
+            train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, trajectory=found, planner=planner)
     with pytest.raises(InvalidOption, match="remove trajectory"):
         train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=found, method="plain")
     with pytest.raises(KeyboardInterrupt):
@@ -201,15 +201,15 @@ def test_the_planner_can_be_chosen_and_the_folder_says_which(tmp_path):
 ])
 def test_wrong_options_are_named_before_a_folder_is_made(options, error, hint, tmp_path):
     with pytest.raises(error, match=hint):
-        train("pbcs/Maze-v0", env_kwargs=MAZE, out=tmp_path / "run", **options)
+        train("pbcs/Maze-v0", env_kwargs=MAZE, out=tmp_path / "run", **{"method": "pbcs"} | options)
     assert not (tmp_path / "run").exists()
 
 
 def test_a_search_that_used_up_its_budget_is_continued_with_a_larger_one(tmp_path):
-    short = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=1, max_transitions=50, out=tmp_path / "run")
+    short = train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, seed=1, max_transitions=50, out=tmp_path / "run")
     assert (short.complete, short.plan_transitions) == (False, 50)
     longer = resume(tmp_path / "run", max_transitions=1_500)
-    whole = train("pbcs/Maze-v0", env_kwargs=MAZE, seed=1, max_transitions=1_500)
+    whole = train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, seed=1, max_transitions=1_500)
     assert (longer.plan_transitions, longer.train_transitions, longer.reason) == (
         whole.plan_transitions, whole.train_transitions, whole.reason)
     assert longer.train_transitions > 0
@@ -219,14 +219,14 @@ def test_folders_are_never_overwritten_and_damage_is_named(tmp_path):
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").write_text("years of work")
     with pytest.raises(RunFolderError, match="already exists"):
-        train("pbcs/Maze-v0", env_kwargs=MAZE, out=tmp_path / "full")
+        train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, out=tmp_path / "full")
     with pytest.raises(RunFolderError, match="nothing to resume"):
         resume(tmp_path / "absent")
-    train("pbcs/Maze-v0", env_kwargs=MAZE, out=tmp_path / "finished")
+    train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, out=tmp_path / "finished")
     with pytest.raises(RunFolderError, match="has ended"):
         resume(tmp_path / "finished")
     with pytest.raises(KeyboardInterrupt):
-        train("pbcs/Maze-v0", env_kwargs=MAZE, seed=1, out=tmp_path / "run", on_progress=StopAfter(3))
+        train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, seed=1, out=tmp_path / "run", on_progress=StopAfter(3))
     checkpoint = tmp_path / "run" / "checkpoint.npz"
     checkpoint.write_bytes(checkpoint.read_bytes()[:1000])
     with pytest.raises(DamagedFile, match="checkpoint"):
@@ -248,7 +248,7 @@ def test_an_exception_of_the_environment_is_named(healthy):
 
     model.transition = broken
     with pytest.raises(CallbackFailed, match="physics"):
-        train(model, trajectory=found.trajectory)
+        train(model, method="pbcs", trajectory=found.trajectory)
 
 
 @pytest.mark.slow
@@ -256,7 +256,8 @@ def test_an_exception_of_the_environment_is_named(healthy):
 def test_pbcs_solves_every_small_maze(size, record_property):
     seeds = 20
     mazes = [{"size": size, "maze_seed": seed} if size > 3 else {"size": size} for seed in range(seeds)]
-    solved = sum(train("pbcs/Maze-v0", env_kwargs=maze, seed=seed).solved for seed, maze in enumerate(mazes))
+    solved = sum(train("pbcs/Maze-v0", method="pbcs", env_kwargs=maze, seed=seed).solved
+                 for seed, maze in enumerate(mazes))
     record_property("solve_rate", ["PBCS", f"{size}x{size}", solved, seeds])
     # Seed 5 of size 4 has 94 of 100. In 5,000 executions its chain succeeds in 97.7 % [97.2, 98.0], less than the
     # 98.5 % that it was verified at; a chain of that rate misses 95 of 100 with a probability of 3 %.

@@ -23,7 +23,8 @@ def trainer():
     states = pbcs_ompl.plan("pbcs/Maze-v0", env_kwargs={"size": 2}, seed=0).trajectory.states
     settings, kind = method_settings("pbcs"), load_agent("ddpg")
     chosen = kind.settings_type.from_preset("fast")
-    return SkillTrainer(lambda seed: kind(*settings.agent_spaces(MODEL), settings=chosen, seeds=(seed,), device="cpu"),
+    spaces = settings.agent_spaces(MODEL)
+    return SkillTrainer(lambda seed, horizon=1.0: kind(*spaces, settings=chosen, seeds=(seed,), device="cpu"),
                         Waypoints.of_plan(states, MODEL, settings), settings.episodes, Counter(),
                         np.random.default_rng(0))
 

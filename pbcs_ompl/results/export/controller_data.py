@@ -72,7 +72,7 @@ def _follower(chain: FollowChain) -> ControllerData:
     size = len(view.normaliser.origin)
     arrays = {"line": line.points, "entries": view.entries, "unit": view.unit, "origin": view.normaliser.origin,
               "scale": view.normaliser.scale, "firsts": np.array(chain.firsts),
-              "distances": _points(view.distances, line.spacing)}
+              "distances": _points(view.distances, line.spacing), "pass_radius": np.array(line.pass_radius)}
     words = {"kind": "follower", "memory": {"pointer": 0, "stalled": -1}, "patience": view.patience,
              "reach": _reach(view.window, line.spacing), "spacing": line.spacing, "time_limit": chain.time_limit,
              "reset_seed": chain.reset_seed}
@@ -87,7 +87,7 @@ def _robot(follower: RobotFollower, line: Line | None) -> ControllerData:
               "distances": _points(view.distances, follower.spacing),
               "half": _points(np.median(view.distances), follower.spacing),
               "side_observations": np.array([one.observation for one in robot.symmetries]),
-              "side_actions": np.array([one.action for one in robot.symmetries])}
+              "side_actions": np.array([one.action for one in robot.symmetries]), "pass_radius": np.array(np.inf)}
     if line is not None:
         arrays["line"] = line.points
     words = {"kind": "robot follower", "memory": {"pointer": 0, "stalled": -1, "side": -1}, "patience": view.patience,

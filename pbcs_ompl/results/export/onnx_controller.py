@@ -166,10 +166,20 @@ def _advanced(graph: Graph, data: ControllerData, places: str, memory: dict[str,
     candidates = graph("Min", graph("Add", graph("Unsqueeze", memory["pointer"], [1]), reach), _last(graph, line))
     away = graph("Sub", graph("Gather", line, candidates, axis=0), graph("Unsqueeze", places, [1]))
     squares = graph("ReduceSum", graph("Mul", away, away), [-1], keepdims=0)
-    nearest = graph("ArgMin", squares, axis=1, keepdims=1)
+    nearest = graph("ArgMin", _passable(graph, squares, data), axis=1, keepdims=1)
     pointer = graph("Squeeze", graph("GatherElements", candidates, nearest, axis=1), [1])
     stood = graph("Add", memory["stalled"], 1)
     return pointer, graph("Where", graph("Greater", pointer, memory["pointer"]), np.array(0), stood)
+
+
+def _passable(graph: Graph, squares: str, data: ControllerData) -> str:
+    """Return squared distances [B, N] of points ahead, infinite from where a pointer may not pass (`Line.advance`)."""
+    numbers = np.arange(data.words["reach"] + 1)
+    before, after = (graph("Gather", squares, chosen, axis=1) for chosen in (numbers[:-1], numbers[1:]))
+    barred = graph("And", graph("Greater", after, before),
+                   graph("Greater", after, data.arrays["pass_radius"] ** 2))
+    beyond = graph("Greater", graph("CumSum", graph.cast(barred, np.int64), np.array(1)), np.array(0))
+    return graph("Concat", graph("Gather", squares, numbers[:1], axis=1), graph("Where", beyond, np.inf, after), axis=1)
 
 
 def _ahead(graph: Graph, line: str, places: str, pointer: str, distances: Any) -> str:

@@ -74,8 +74,9 @@ class FollowChain(TrainedController):
     def content(self) -> ChainContent:
         """The line and what policies see as arrays, the pointers from which they act in the structure."""
         view = self.view
-        arrays = {"points": self.line.points, "entries": view.entries, "unit": view.unit,
-                  "origin": view.normaliser.origin, "scale": view.normaliser.scale, "distances": view.distances}
+        arrays = {"points": self.line.points, "pass_radius": np.array(self.line.pass_radius),
+                  "entries": view.entries, "unit": view.unit, "origin": view.normaliser.origin,
+                  "scale": view.normaliser.scale, "distances": view.distances}
         structure = {"skills": [{"first": int(first)} for first in self.firsts], "spacing": self.line.spacing,
                      "window": view.window, "patience": view.patience}
         return ChainContent(structure, arrays, [SkillPolicy(policy, ObservationTransform.identity(view.size))
@@ -90,4 +91,5 @@ class FollowChain(TrainedController):
                         structure["window"], structure["patience"])
         return cls(policies=tuple(policy.actor for policy in policies),
                    firsts=tuple(place["first"] for place in structure["skills"]),
-                   line=Line(arrays["points"], structure["spacing"]), view=view, **task)
+                   line=Line(arrays["points"], structure["spacing"], float(arrays.get("pass_radius", np.inf))),
+                   view=view, **task)

@@ -1,6 +1,6 @@
 """Path following: one policy along the whole plan, and more only where one does not succeed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import NamedTuple
 
@@ -13,19 +13,18 @@ from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.follower import Progress, Relay
 from pbcs_ompl.skills.path_following.task import LOOKS, FollowTask, LineSettings, Position
+from pbcs_ompl.skills.path_following.verdict import Trouble, Verdict, judged
 from pbcs_ompl.skills.sequential_test import SequentialTest
 from pbcs_ompl.skills.settings import AgentSpaces, PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
 
-FIRST_TRIALS = 4
-"""Noisy executions of a test before the sequential test is asked; each time as many again follow."""
 SHORTEST_SESSION = 250
 """Transitions of a session along a short line."""
 
 
 @dataclass(frozen=True)
 class FollowSettings(PlannedSettings):
-    """Settings of the method "follow"; those of the groups `starts` and `plan` have no meaning for it.
+    """Settings of the method "follow"; those of the groups `starts` and `plan`, but `improve`, have no meaning for it.
 
     A step is worth progress_reward * (its progress, in steps) - effort_cost * (mean square of the action, in [-1, 1]),
     and `episodes.success_reward` more where it reaches the end.
@@ -46,7 +45,10 @@ class FollowSettings(PlannedSettings):
             good policy is dear).
         averaging: Fraction of the averaged policy that stays after an update of the agent; it is the average that is
             tested and kept (ours: that of the agent's target networks; with 0, the last policy, tests fail more often).
-        attempts: Tests that a policy may fail before the line is split (ours; 6 and 10 were equal in mazes).
+        attempts: Tests that a policy may fail before the line is split (ours; 6 and 10 were equal in mazes). Each time
+            that training begins again, its sessions are twice as long.
+        longest_horizon: Each time that training begins again, the agent's horizon 1 / (1 - discount) is twice as long,
+            up to this many times that of its settings (ours: with a short one, it does not learn to fly).
     """
 
     line: LineSettings = field(default_factory=LineSettings)
@@ -60,11 +62,13 @@ class FollowSettings(PlannedSettings):
     test_share: float = 0.5
     averaging: float = 0.995
     attempts: int = 6
+    longest_horizon: float = 4.0
 
     def _check_ranges(self) -> None:
         self._check_positive("progress_reward")
         self._check("at least 0", lambda value: value >= 0, "effort_cost", "action_noise", "test_share")
         self._check_fractions("start_fraction", "retry_fraction", "averaging")
+        self._check("at least 1", lambda value: value >= 1, "longest_horizon")
         self._check_counts("session_lengths", "attempts")
 
     def agent_spaces(self, model: ResettableModel) -> AgentSpaces:
@@ -80,14 +84,6 @@ class Member(NamedTuple):
     policy: Policy
 
 
-class Verdict(NamedTuple):
-    """The result of a test: whether the policy passed, its success rate with noise, where its failures ended."""
-
-    passed: bool
-    rate: float
-    blocked: int
-
-
 @dataclass
 class FollowState:
     """The variables of the loop.
@@ -100,6 +96,7 @@ class FollowState:
         best_rate, best_blocked: Those of its best test so far.
         candidate: The pointer from which the best policy is tried next, in a split.
         passed: Whether the policies lead from the start to the goal.
+        rounds: How often training has begun again.
     """
 
     end: int
@@ -110,15 +107,19 @@ class FollowState:
     best_blocked: int = 0
     candidate: int = 0
     passed: bool = False
+    rounds: int = 0
 
 
 class Follow:
     """Trains one policy to move along the plan, from states all along it, until it passes a sequential test.
 
     A test executes the policy from the start once without noise and, if that succeeds, with random actions until the
-    sequential test has an answer. After `attempts` failed tests the line is split: the best policy is tried from where
-    its failures ended. From the first place where it passes it is kept to the end, and a new policy is trained up to
-    there. Where it passes nowhere, training begins again with new networks.
+    sequential test has an answer. Where the last such test found failures, executions begin shortly before them and end
+    shortly after them first: a policy that still fails there is refused for a fraction of the steps.
+
+    After `attempts` failed tests the line is split: the best policy is tried from where its failures ended. From the
+    first place where it passes it is kept to the end, and a new policy is trained up to there. Where it passes nowhere,
+    training begins again with new networks, longer sessions and a longer horizon.
 
     Source: ours. Starts all along a demonstration are those of DeepMimic (Peng et al. 2018, "reference state
     initialization"); the split is the idea of [Matheron2020] chapter 7.
@@ -132,13 +133,14 @@ class Follow:
         self.members: list[Member] = []
         """Finished policies, in the order of execution."""
         self.best: Policy | None = None
-        self._train_to(self.task.line.last + 1)
+        self._train_to(self.task.line.last + 1, 0)
 
-    def _train_to(self, end: int) -> None:
+    def _train_to(self, end: int, rounds: int) -> None:
         """Train a policy from the start to the pointer `end` from now on."""
-        self.state = FollowState(end)
+        self.state = FollowState(end, rounds=rounds)
         self.best = None
         self._retries: Position | None = None
+        self._trouble: Trouble | None = None
         self._average = self._present()
         self._position = self._fresh(self.trainer.settings.episodes_per_batch)
         self._steps = np.zeros(len(self._position.states), dtype=np.int64)
@@ -174,7 +176,7 @@ class Follow:
 
     @property
     def _session_transitions(self) -> int:
-        return max(SHORTEST_SESSION, self.settings.session_lengths * self.task.hops,
+        return max(max(SHORTEST_SESSION, self.settings.session_lengths * self.task.hops) << self.state.rounds,
                    round(self.settings.test_share * self.state.tested))
 
     @property
@@ -286,38 +288,58 @@ class Follow:
             state.candidate = max(self._beyond(found.blocked), state.candidate + 1)
 
     def _begin_again(self, end: int) -> None:
-        self.trainer.restart()
-        self._train_to(end)
+        rounds = self.state.rounds + 1
+        self.trainer.restart(min(2.0 ** rounds, self.settings.longest_horizon))
+        self._train_to(end, rounds)
+
+    @property
+    def _window(self) -> int:
+        """The window, in points of the line."""
+        return max(1, round(self.settings.line.window / self.task.line.spacing))
 
     def _beyond(self, pointer: int) -> int:
         """Return the pointer one window after another."""
-        return pointer + max(1, round(self.settings.line.window / self.task.line.spacing))
+        return pointer + self._window
 
     def _try(self, policy: Policy, first: int) -> Verdict:
         """Test a policy, and the finished ones after it, from a pointer on."""
+        found = self._verdict(policy, first)
+        self.trainer.latest |= {"start": self.task.place(first), "success_rate": max(0.0, found.rate)}
+        return found
+
+    def _verdict(self, policy: Policy, first: int) -> Verdict:
+        """Execute it once without noise, then from where the last one failed, then from the pointer on with noise."""
         relay = Relay([policy, *(member.policy for member in self.members)],
                       [0, *(member.first for member in self.members)])
-        place = self.task.place(first)
-        blocked = self._failures(relay, place, 1, 0.0)
-        if len(blocked):
-            return Verdict(False, 0.0, int(blocked[0]))
-        trials, passed, gate = 0, None, self.settings.gate
-        while passed is None:
-            count = min(max(trials, FIRST_TRIALS), gate.most_needed(trials - len(blocked), trials))
-            blocked = np.concatenate([blocked, self._failures(relay, place, count, self.trainer.settings.test_epsilon)])
-            trials += count
-            passed = gate.verdict(trials - len(blocked), trials)
-        return Verdict(passed, 1.0 - len(blocked) / trials, int(blocked.max(initial=0)))
+        start, goal = self.task.at(np.array([self.task.place(first)])), np.array([self.task.line.last + 1])
+        ends = self._failures(relay, start, goal, 0.0).ends
+        if len(ends):
+            return Verdict(False, 0.0, int(ends[0]))
+        if first == 0 and self._trouble is not None:
+            past, _ = self._executed(relay, self._trouble.before, self._trouble.ends + 2 * self._window)
+            if not past.passed:
+                return past._replace(rate=-1.0)
+        verdict, trouble = self._executed(relay, start, goal)
+        if first == 0 and not verdict.passed:
+            self._trouble = trouble
+        return verdict
 
-    def _failures(self, relay: Relay, place: int, count: int, epsilon: float) -> IndexArray:
-        """Return where those of `count` executions that fail come to their ends [at most count]; keep their states."""
-        tries = self.task.execute(relay, np.full(count, place), epsilon=epsilon, max_steps=self._max_steps,
+    def _executed(self, relay: Relay, starts: Position, until: IndexArray) -> tuple[Verdict, Trouble]:
+        """Return the verdict on noisy executions from starts [N] to pointers [N], in turn, and where they failed."""
+        def failures(chosen: IndexArray) -> Trouble:
+            return self._failures(relay, starts[chosen], until[chosen], self.trainer.settings.test_epsilon)
+
+        return judged(self.settings.gate, len(until), failures)
+
+    def _failures(self, relay: Relay, starts: Position, until: IndexArray, epsilon: float) -> Trouble:
+        """Return where executions from some starts [N] fail; training begins there from now on."""
+        tries = self.task.execute(relay, starts, until=until, epsilon=epsilon, max_steps=self._max_steps,
                                   patience=4 * self.settings.line.patience, rng=self.trainer.rng,
                                   counter=self.trainer.counter)
         mine = np.flatnonzero(tries.retries.progress.pointers < self.state.end)
         if len(mine):
             self._retries = tries.retries[mine]
-        return tries.pointers[~tries.success]
+        return Trouble(tries.before, tries.pointers[~tries.success])
 
     def snapshot(self) -> Snapshot:
         """Return everything needed to resume bit for bit."""
@@ -330,6 +352,10 @@ class Follow:
                    "episode.stalled": progress.stalled, "episode.steps": self._steps}
         if self._retries is not None:
             arrays |= {"retry.states": self._retries.states, "retry.pointers": self._retries.progress.pointers}
+        if self._trouble is not None:
+            before = self._trouble.before
+            arrays |= {"trouble.states": before.states, "trouble.pointers": before.progress.pointers,
+                       "trouble.ends": self._trouble.ends}
         return Snapshot({"trainer": plain, "state": asdict(self.state), "policies": len(policies),
                          "firsts": [member.first for member in self.members]}, arrays)
 
@@ -341,14 +367,18 @@ class Follow:
         self.members = [Member(*pair) for pair in zip(plain["firsts"], policies, strict=False)]
         self.best = policies[-1] if len(policies) > len(self.members) else None
         self.trainer.restore(plain["trainer"], {name: array for name, array in arrays.items()
-                                                if not name.startswith(("policy", "episode.", "retry."))})
+                                                if not name.startswith(("policy", "episode.", "retry.", "trouble."))})
         self.state = FollowState(**plain["state"])
         self._position = self._at(arrays["episode.states"], arrays["episode.pointers"], arrays["episode.stalled"])
-        self._retries = None
-        if "retry.states" in arrays:
-            pointers = arrays["retry.pointers"]
-            self._retries = self._at(arrays["retry.states"], pointers, np.zeros_like(pointers))
+        self._retries = self._begun("retry", arrays) if "retry.states" in arrays else None
+        self._trouble = (Trouble(self._begun("trouble", arrays), arrays["trouble.ends"].copy())
+                         if "trouble.states" in arrays else None)
         self._steps = arrays["episode.steps"].copy()
+
+    def _begun(self, name: str, arrays: Mapping[str, np.ndarray]) -> Position:
+        """Return starts of executions from a snapshot."""
+        pointers = arrays[f"{name}.pointers"]
+        return self._at(arrays[f"{name}.states"], pointers, np.zeros_like(pointers))
 
     def _at(self, states: Array, pointers: IndexArray, stalled: IndexArray) -> Position:
         """Return executions in some states [B, D]."""

@@ -18,18 +18,22 @@ class Line:
     Attributes:
         points: [P, F], from the start to the end; a line of no length has one.
         spacing: Length of the line between neighbouring points.
+        pass_radius: A pointer passes a point only within this distance of it, or while points come nearer. So what is
+            on the other side of a wall does not draw a pointer past the end of the wall.
     """
 
     points: Array
     spacing: float
+    pass_radius: float = np.inf
 
     @classmethod
-    def through(cls, corners: Array, spacing: float) -> "Line":
+    def through(cls, corners: Array, spacing: float, pass_radius: float = np.inf) -> "Line":
         """Return the line through some corners in order.
 
         Args:
             corners: [N, F]; equal ones in a row count once.
             spacing: Length between the points of the line, about: a whole number of them fits into the length.
+            pass_radius: See the attribute.
 
         Raises:
             InvalidOption: no corner, one that is not finite, or a spacing that is not greater than 0.
@@ -40,12 +44,12 @@ class Line:
             raise InvalidOption(f"spacing={spacing:g}; expected greater than 0")
         lengths = arc_lengths(corners)
         if lengths[-1] == 0.0:
-            return cls(corners[:1].copy(), spacing)
+            return cls(corners[:1].copy(), spacing, pass_radius)
         kept = np.concatenate([[True], np.diff(lengths) > 0])
         count = max(1, round(float(lengths[-1]) / spacing))
         places = np.linspace(0.0, lengths[-1], count + 1)
         columns = [np.interp(places, lengths[kept], column) for column in corners[kept].T]
-        return cls(np.stack(columns, axis=1), float(lengths[-1]) / count)
+        return cls(np.stack(columns, axis=1), float(lengths[-1]) / count, pass_radius)
 
     @property
     def last(self) -> int:
@@ -65,16 +69,18 @@ class Line:
         """Return the pointers [B] moved forward: to the nearest point of those up to `window` ahead.
 
         A pointer never moves back. Where a line comes close to itself, the window keeps a pointer from leaving out what
-        lies between.
+        lies between, and so does `pass_radius`.
 
         Args:
             features: Where the executions are [B, F].
             pointers: Where their pointers were [B].
             window: The longest move, a length.
         """
-        reach = np.arange(max(1, round(window / self.spacing)) + 1)
-        candidates = np.minimum(pointers[:, None] + reach, self.last)
+        moves = np.arange(max(1, round(window / self.spacing)) + 1)
+        candidates = np.minimum(pointers[:, None] + moves, self.last)
         squares = ((self.points[candidates] - features[:, None]) ** 2).sum(axis=2)
+        barred = (squares[:, 1:] > squares[:, :-1]) & (squares[:, 1:] > self.pass_radius ** 2)
+        squares[:, 1:][np.logical_or.accumulate(barred, axis=1)] = np.inf
         return np.take_along_axis(candidates, squares.argmin(axis=1)[:, None], axis=1)[:, 0]
 
     def ahead(self, features: Array, pointers: IndexArray, distances: Array) -> Array:

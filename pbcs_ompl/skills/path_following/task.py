@@ -34,16 +34,18 @@ class LineSettings(Settings):
         spacing: Between the points of the line (ours, not tuned).
         look_ahead: Policies see the line 1, 2 and 4 times this ahead (ours; with 2, fewer mazes were solved).
         window: The longest move of a pointer in a step (ours; with 8, fewer mazes were solved).
+        pass_radius: A pointer passes points of the line within this distance only, see `Line` (ours).
         patience: Steps without progress after which an episode has failed (ours; 20 and 40 were equal in mazes).
     """
 
     spacing: float = 0.5
     look_ahead: float = 1.0
     window: float = 4.0
+    pass_radius: float = 1.0
     patience: int = 20
 
     def _check_ranges(self) -> None:
-        self._check_positive("spacing", "look_ahead", "window")
+        self._check_positive("spacing", "look_ahead", "window", "pass_radius")
         self._check_counts("patience")
 
 
@@ -57,6 +59,14 @@ class Position:
 
     def __getitem__(self, members: IndexArray) -> "Position":
         return Position(self.states[members], self.observations[members], self.progress[members])
+
+    @classmethod
+    def together(cls, positions: Sequence["Position"]) -> Self:
+        """Return several as one."""
+        return cls(np.concatenate([one.states for one in positions]),
+                   np.concatenate([one.observations for one in positions]),
+                   Progress(np.concatenate([one.progress.pointers for one in positions]),
+                            np.concatenate([one.progress.stalled for one in positions])))
 
     def put(self, members: IndexArray, others: "Position") -> None:
         """Let some executions be others from now on."""
@@ -91,11 +101,13 @@ class Tries:
         success: Which succeeded [B].
         pointers: How far they came on the line [B].
         retries: Where those that failed were in the steps around their last progress, as starts of new executions [N].
+        before: Where each of those that failed was a patience before its last progress, or began [F].
     """
 
     success: BoolArray
     pointers: IndexArray
     retries: Position
+    before: Position
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +149,8 @@ class FollowTask:
         unit = np.where(steps > 0, steps, 1.0)
         kept = erase_loops(features / unit, 1.0)
         corners = features[kept] / unit
-        line = Line.through(extended(corners, settings.look_ahead * max(LOOKS)), settings.spacing)
+        line = Line.through(extended(corners, settings.look_ahead * max(LOOKS)), settings.spacing,
+                            settings.pass_radius)
         hop = np.searchsorted(kept, np.arange(len(states)), side="right") - 1
         deviation = observations.std(axis=0)
         normaliser = ObservationTransform(observations.mean(axis=0), np.where(deviation > 1e-9, deviation, 1.0))
@@ -167,13 +180,14 @@ class FollowTask:
         return FollowStep(Position(outcome.states, observations, progress), gains, outcome.success,
                           outcome.terminated, outcome.ended)
 
-    def execute(self, relay: Relay, places: IndexArray, *, epsilon: float, max_steps: int, patience: int,
-                rng: np.random.Generator, counter: Counter) -> Tries:
+    def execute(self, relay: Relay, position: Position, *, until: IndexArray, epsilon: float, max_steps: int,
+                patience: int, rng: np.random.Generator, counter: Counter) -> Tries:
         """Let policies act, in the model, until the goal, the end of the episode or of patience.
 
         Args:
             relay: The policies.
-            places: The numbers of the plan's states where executions begin [B].
+            position: Where executions begin.
+            until: Pointers at which they have succeeded without the goal [B].
             epsilon: Fraction of random actions.
             max_steps: Steps after which an execution has failed.
             patience: Steps without progress after which it has.
@@ -183,26 +197,27 @@ class FollowTask:
         Raises:
             BudgetUsedUp: in the middle of the executions.
         """
-        position = self.at(places)
-        success, pointers = np.zeros(len(places), dtype=np.bool_), position.progress.pointers.copy()
-        alive, trail = np.arange(len(places)), []
+        pointers = position.progress.pointers.copy()
+        success, alive, trail = np.zeros(len(pointers), dtype=np.bool_), np.arange(len(pointers)), []
         for _ in range(max_steps):
             trail.append((alive, position))
             controls = relay.act(self.inputs(position), position.progress.pointers)
             controls = with_random_actions(self.model, controls, epsilon, rng)
             counter.spend(len(alive))
             after = self.step(position, controls)
-            pointers[alive], success[alive] = after.position.progress.pointers, after.success
-            over = after.success | after.ended | (after.position.progress.stalled >= patience)
+            pointers[alive] = after.position.progress.pointers
+            success[alive] = after.success | (pointers[alive] >= until[alive])
+            over = success[alive] | after.ended | (after.position.progress.stalled >= patience)
             going = np.flatnonzero(~over)
             alive, position = alive[going], after.position[going]
             if not len(alive):
                 break
-        return Tries(success, pointers, around_last_progress(trail, ~success, self.view.patience))
+        return Tries(success, pointers, *around_last_progress(trail, ~success, self.view.patience))
 
 
-def around_last_progress(trail: Sequence[tuple[IndexArray, Position]], failed: BoolArray, reach: int) -> Position:
-    """Return where executions that failed were, as starts of new ones [N].
+def around_last_progress(trail: Sequence[tuple[IndexArray, Position]], failed: BoolArray,
+                         reach: int) -> tuple[Position, Position]:
+    """Return where executions that failed were, as starts of new ones [N], and the first of these for each of them [F].
 
     Args:
         trail: For each step, the executions that made it and where they were before it.
@@ -217,7 +232,8 @@ def around_last_progress(trail: Sequence[tuple[IndexArray, Position]], failed: B
     kept = failed[members] & (np.abs(steps - last[members]) <= reach)
     states, observations, pointers = (np.concatenate(parts)[kept] for parts in zip(*(
         (position.states, position.observations, position.progress.pointers) for _, position in trail), strict=True))
-    return Position(states, observations, Progress.at(pointers))
+    every = Position(states, observations, Progress.at(pointers))
+    return every, every[np.unique(members[kept], return_index=True)[1]]
 
 
 def extended(corners: Array, length: float) -> Array:

@@ -48,6 +48,9 @@ SMALL = {
                       "values": {"alpha": [1, 3], "beta": [5, 50], "radius": [0.1, 0.2]}},
     "ex-settings": {"bin_size": [0.15, 1.0], "batch": [1, 16],
                     "scenes": {"maze": {"env": "pbcs/Maze-v0", "env_kwargs": {"size": 2}}}},
+    "rides-ablation": {"max_transitions": 5000, "without": ["rides", "learnt-scales"],
+                       "peers": {"Ex": {"planner": "Ex"}},
+                       "scenes": {"maze-2": {"env": "pbcs/Maze-v0", "env_kwargs": {"size": 2}}}},
     "half-cheetah-priming": {
         "episodes": 2, "primed_every": 2,
         "variants": {name: {"agent": "ddpg", "primed": name.endswith("primed")} for name in ("ddpg", "ddpg-primed")}},
@@ -66,7 +69,7 @@ SMALL = {
                          "scenes": {"maze-2": {"env": "pbcs/Maze-v0", "env_kwargs": {"size": 2}}}},
 }
 SLOW = ("antmaze-exploration", "backplay-2x2", "closed-loop", "deadlock", "exploration-trees", "half-cheetah-priming",
-        "offline-vs-bootstrapped", "pbcs-ablation", "toy-analysis")
+        "maze-table", "offline-vs-bootstrapped", "pbcs-ablation", "toy-analysis", "tree-pitfalls")
 
 
 SIMULATED = ("antmaze-exploration", "half-cheetah-priming")

@@ -60,7 +60,7 @@ def chain(actions: ActionMap, normed: bool = False) -> Case:
 
 def follow_chain() -> Case:
     rng = np.random.default_rng(1)
-    line = Line.through(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]]), 0.5)
+    line = Line.through(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]]), 0.5, pass_radius=2.0)
     view = LineView(np.array([1, 0]), np.array([0.1, 0.1]), ObservationTransform(np.ones(2), np.full(2, 2.0)),
                     np.array([1.0, 2.0, 4.0]), 2.0, 10)
     policies = tuple(network(rng, view.size) for _ in range(3))

@@ -156,7 +156,7 @@ def test_a_demonstration_is_a_trajectory_that_training_takes(plan: Path) -> None
     made = pbcs_ompl.Trajectory.from_arrays("pbcs/Maze-v0", longer, reset_seed=kept.reset_seed, env_kwargs=MAZE)
     np.testing.assert_array_equal(made.states, kept.states)
     assert made.replays_exactly(pbcs_ompl.make("pbcs/Maze-v0", MAZE))
-    trained = pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=made, max_transitions=2_000)
+    trained = pbcs_ompl.train("pbcs/Maze-v0", method="pbcs", env_kwargs=MAZE, trajectory=made, max_transitions=2_000)
     assert trained.plan_transitions == 0
     state = pbcs_ompl.Trajectory.from_arrays("pbcs/Maze-v0", kept.actions, first_state=kept.states[0], env_kwargs=MAZE)
     assert state.reset_seed is None

@@ -74,7 +74,7 @@ def test_an_evaluation(laboratory, call):
     (chain,), options = call(repeating(read_folder(Path("runs/evaluation"))))
     again = {"kind": "eval", "environment": chain.environment.to_dict(), "chain": "runs/training", **options}
     assert again == settings(Path("runs/evaluation"))
-    assert len(chain.skills) > 0
+    assert chain.num_policies > 0
 
 
 def test_a_comparison(laboratory, call):

@@ -18,9 +18,10 @@ from pbcs_ompl.skills import load_chain, method_settings
 from pbcs_ompl.skills.agent_interface import load_agent
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
-from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings, Verdict
+from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings
 from pbcs_ompl.skills.path_following.follower import Progress, Relay
 from pbcs_ompl.skills.path_following.task import FollowTask, LineSettings, Position, around_last_progress, extended
+from pbcs_ompl.skills.path_following.verdict import Trouble, Verdict
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
 
@@ -49,8 +50,8 @@ def method(states: np.ndarray, settings: FollowSettings | None = None, budget: i
     chosen = settings or method_settings("follow")
     assert isinstance(chosen, FollowSettings)
     kind, spaces = load_agent("ddpg"), chosen.agent_spaces(MODEL)
-    trainer = SkillTrainer(lambda seed: kind(*spaces, settings=kind.settings_type.from_preset("fast"), seeds=(seed,),
-                                             device="cpu"),
+    agent = kind.settings_type.from_preset("fast")
+    trainer = SkillTrainer(lambda seed, horizon=1.0: kind(*spaces, settings=agent, seeds=(seed,), device="cpu"),
                            Waypoints.of_plan(states, MODEL, chosen), chosen.episodes, Counter(budget),
                            np.random.default_rng(0))
     return Follow(trainer, chosen)
@@ -163,6 +164,8 @@ def test_a_policy_that_passes_nowhere_begins_again(plan: Trajectory, monkeypatch
         following.step()
     assert following.trainer.agent is not agent
     assert (following.members, following.state.end, following.state.tests) == ([], last + 1, 0)
+    sessions = method(plan.states, following.settings)._session_transitions
+    assert following._session_transitions == 2 * sessions
 
 
 def test_starts_lie_all_along_the_plan_before_the_end(plan: Trajectory) -> None:
@@ -261,22 +264,29 @@ def test_executions_that_fail_are_tried_again_from_around_their_last_progress(pl
         begun = task.at(rng.integers(0, plan.length, len(alive)))
         trail.append((alive, Position(begun.states, begun.observations,
                                       Progress(begun.progress.pointers, stalls[alive, step]))))
-    expected = []
+    expected, members = [], []
     for step, (alive, position) in enumerate(trail):
         for row, member in enumerate(alive):
             last = max(index for index in range(lengths[member]) if stalls[member, index] == 0)
             if failed[member] and abs(step - last) <= reach:
                 expected.append((*position.states[row], position.progress.pointers[row]))
-    found = around_last_progress(trail, failed, reach)
+                members.append(member)
+    found, before = around_last_progress(trail, failed, reach)
     assert [(*state, pointer) for state, pointer in zip(found.states, found.progress.pointers, strict=True)] == expected
     assert not found.progress.stalled.any()
+    first = {member: row for row, member in reversed(list(enumerate(members)))}
+    np.testing.assert_array_equal(before.states, found.states[[first[0], first[1]]])
 
 
 def test_a_refused_policy_is_trained_where_it_failed(plan: Trajectory) -> None:
     following = method(plan.states, FollowSettings().updated({"retry_fraction": 1.0, "session_lengths": 1}))
     following.step()
     assert following._retries is None
-    following._failures(Relay([following._present()], [0]), 0, 3, 0.0)
+    start = following.task.at(np.array([0]))[np.zeros(3, dtype=np.int64)]
+    beyond = np.full(3, following.task.line.last + 1)
+    still = replace(following._present(), action_low=np.zeros(2), action_high=np.zeros(2))
+    found = following._failures(Relay([still], [0]), start, beyond, 0.0)
+    assert len(found.before.states) == len(found.ends) == 3
     assert following._retries is not None
     places = {tuple(state) for state in following._retries.states}
     assert {tuple(state) for state in following._fresh(50).states} <= places
@@ -284,6 +294,34 @@ def test_a_refused_policy_is_trained_where_it_failed(plan: Trajectory) -> None:
     again.restore(following.snapshot())
     assert again._retries is not None
     np.testing.assert_array_equal(again._retries.states, following._retries.states)
+
+
+def test_a_policy_is_refused_where_the_last_one_failed_without_an_execution_of_the_whole_line(
+        plan: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Executions fail in the middle of the line until `learnt`."""
+    following = method(plan.states)
+    task, begun, learnt = following.task, list[int](), [False]
+    middle = task.line.last // 2
+
+    def failures(self: Follow, relay: Relay, starts: Position, until: np.ndarray, epsilon: float) -> Trouble:
+        begun.extend(starts.progress.pointers.tolist())
+        fail = (until > middle) & (not learnt[0]) & (epsilon > 0)
+        shortly_before = task.at(np.full(fail.sum(), task.place(middle - 5)))
+        return Trouble(shortly_before, np.full(fail.sum(), middle))
+
+    monkeypatch.setattr(Follow, "_failures", failures)
+    assert following._try(following._present(), 0) == Verdict(False, 0.0, middle)
+    assert set(begun) == {0}
+    begun.clear()
+    assert not following._try(following._present(), 0).passed
+    assert begun.count(0) == 1  # without noise
+    assert set(begun[1:]) == {task.pointers[task.place(middle - 5)]}
+    restored = method(plan.states)
+    restored.restore(following.snapshot())
+    begun.clear()
+    learnt[0] = True
+    assert restored._try(following._present(), 0).passed
+    assert {0, task.pointers[task.place(middle - 5)]} == set(begun)
 
 
 def test_a_session_takes_its_share_of_the_test_before(plan: Trajectory) -> None:

@@ -1,5 +1,7 @@
 """Lines: a loop over executions gives the same, and the laws that a follower relies on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,9 +18,13 @@ def line() -> Line:
 
 def one_step(line: Line, feature: np.ndarray, pointer: int, window: float) -> int:
     """The definition, for one execution."""
-    best, nearest = pointer, np.inf
+    best = pointer
+    nearest = before = np.inf
     for place in range(pointer, min(pointer + max(1, round(window / line.spacing)), line.last) + 1):
         distance = float(np.linalg.norm(line.points[place] - feature))
+        if distance > before and distance > line.pass_radius:
+            break
+        before = distance
         if distance < nearest:
             best, nearest = place, distance
     return best
@@ -33,7 +39,9 @@ def test_points_are_evenly_spaced_along_the_line(line: Line) -> None:
     assert np.median(straight) == pytest.approx(line.spacing)
 
 
-def test_a_batch_advances_as_one_execution_after_the_other(line: Line) -> None:
+@pytest.mark.parametrize("pass_radius", [np.inf, 1.0, 0.1])
+def test_a_batch_advances_as_one_execution_after_the_other(line: Line, pass_radius: float) -> None:
+    line = replace(line, pass_radius=pass_radius)
     rng = np.random.default_rng(0)
     features = rng.uniform(-0.5, 3.5, (200, 2))
     pointers = rng.integers(0, line.last + 1, 200)
@@ -59,6 +67,17 @@ def test_the_window_keeps_a_pointer_on_its_side_of_a_bend(line: Line) -> None:
     start = line.pointer_at(np.array([1.0]))
     assert line.points[line.advance(near_both, start, 1.0)[0], 1] == 0.0
     assert line.points[line.advance(near_both, start, 100.0)[0], 1] == 2.0
+
+
+def test_a_pointer_does_not_pass_the_end_of_a_wall_that_the_execution_has_not_passed() -> None:
+    """The line leads around the end of a wall, which is at (3, 1); what is beyond it is nearer than the end."""
+    around = np.array([[0.0, 0.9], [3.1, 0.9], [3.1, 1.1], [0.0, 1.1]])
+    line, behind = Line.through(around, 0.1, pass_radius=0.5), np.array([[2.2, 1.02]])
+    there, back = line.pointer_at(np.array([2.2, 4.2]))
+    assert replace(line, pass_radius=np.inf).advance(behind, np.array([there]), 4.0)[0] == back
+    assert line.advance(behind, np.array([there]), 4.0)[0] == there
+    near = np.array([[2.9, 1.02]])
+    assert line.points[line.advance(near, np.array([there]), 4.0)[0], 1] == pytest.approx(1.1)
 
 
 def test_points_ahead_are_relative_and_end_at_the_end(line: Line) -> None:

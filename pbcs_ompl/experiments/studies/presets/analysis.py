@@ -91,9 +91,12 @@ def _cost(record: dict[str, Any]) -> float:
 
 
 def _draw(rows: dict[str, Records], title: str, path: Path) -> None:
+    rows = {row: runs for row, runs in rows.items() if runs}
+    if not rows:
+        return
     sizes = sorted({record["size"] for runs in rows.values() for record in runs})
-    groups = {f"{size}x{size}": {row: [r for r in runs if r["size"] == size] for row, runs in rows.items()}
-              for size in sizes}
+    groups = {f"{size}x{size}": {row: some for row, runs in rows.items()
+                                 if (some := [r for r in runs if r["size"] == size])} for size in sizes}
     budget = max(record["max_transitions"] for runs in rows.values() for record in runs)
     publish(rows_figure(
         {"share of solved runs": {size: {row: (sum(r["solved"] for r in runs), len(runs)) for row, runs in one.items()}
