@@ -1,22 +1,19 @@
 """OMPL's KPIECE1 as a compiled strategy."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from pbcs_ompl.core.options import check_positive_numbers
 from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import IndexArray
-from pbcs_ompl.planners.compiled import CompiledStep
 from pbcs_ompl.planners.context import PlanningContext
+from pbcs_ompl.planners.grid_strategy import GridStrategy
 from pbcs_ompl.planners.kernels import kpiece_loop
-from pbcs_ompl.planners.kernels.grid import CELLS, empty_grid, reserve
-from pbcs_ompl.planners.motions import bounds_of, motions_of
-from pbcs_ompl.planners.planner import Strategy
+from pbcs_ompl.planners.kernels.grid import CELLS, reserve
+from pbcs_ompl.planners.motions import motions_of
 
 
-class KPIECE1Compiled(Strategy):
+class KPIECE1Compiled(GridStrategy):
     """Expand the most important cell: of late birth, few selections, few motions, few neighbours.
 
     Source: OMPL's control::KPIECE1 (Sucan and Kavraki 2008), so that times compare algorithms instead of bindings.
@@ -29,19 +26,11 @@ class KPIECE1Compiled(Strategy):
             suggests.
     """
 
-    def __init__(self, bin_size: float | Sequence[float] | None = None):
-        self._given_size = None if bin_size is None else check_positive_numbers("bin_size", bin_size)
-
     def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
         """Begin without cells."""
         super().start(context, rng)
-        self._size, turns = context.bins("bin_size", self._given_size)
-        self._grid, self._judged = empty_grid(turns), kpiece_loop.none_judged()
+        self._judged = kpiece_loop.none_judged()
         self._selected: list[int] = []
-
-    def resolved(self) -> dict[str, Any]:
-        """Return the edges of the cells."""
-        return {"bin_size": self._size.tolist()}
 
     def select(self, tree: Tree, count: int) -> IndexArray:
         """Return `count` selections in a row."""
@@ -62,15 +51,8 @@ class KPIECE1Compiled(Strategy):
             alive = np.array([node for node in motion if not tree.terminal[node]], np.int64)
             kpiece_loop.note(self._grid, self._judged, features, alive, number, self._size, self.rng)
 
-    def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:
-        """Add motions in compiled code (see `pbcs_ompl.planners.compiled`)."""
-        tree.reserve(count)
-        self._reserve(count)
-        written, reached = kpiece_loop.expand(step.parameters, feature_dims, bounds_of(self.context),
-                                              self.context.control_durations, tree.columns, len(tree), count,
-                                              self._grid, self._judged, self._size, self.rng)
-        tree.claim(written)
-        return len(tree) - 1 if reached else -1
+    def _compiled(self) -> tuple[Any, Any]:
+        return kpiece_loop.expand, self._judged
 
     def _reserve(self, count: int) -> None:
         self._grid = reserve(self._grid, count)
