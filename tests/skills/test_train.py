@@ -51,6 +51,7 @@ def test_pbcs_solves_the_small_maze(tmp_path):
     assert json.loads((tmp_path / "run" / "result.json").read_text())["train_transitions"] == result.train_transitions
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_chain_in_a_fresh_process(tmp_path):
     script = ("import sys; from pbcs_ompl.skills import train; "
               "train('pbcs/Maze-v0', method='pbcs', env_kwargs={'size': 2}, seed=5, out=sys.argv[1])")
@@ -95,8 +96,9 @@ def test_a_training_that_was_stopped_or_killed_resumes_bit_for_bit(tmp_path, num
 
 
 @pytest.mark.parametrize(("method", "budget"), [("pbcs", 10_000_000), ("pb", 20_000), ("backplay", 20_000),
-                                                ("plain", 30_000), ("bootstrapped", 60_000),
-                                                ("offline", 30_000)])
+                                                ("plain", 30_000),
+                                                pytest.param("bootstrapped", 60_000, marks=pytest.mark.slow),
+                                                pytest.param("offline", 30_000, marks=pytest.mark.slow)])
 def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, method, budget):
     options = {"env_kwargs": MAZE, "seed": 1, "method": method, "max_transitions": budget}
     whole = train("pbcs/Maze-v0", **options)
@@ -110,6 +112,7 @@ def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, method, budget):
     assert (tmp_path / "run" / "checkpoint.npz").exists() == (not result.complete)
 
 
+@pytest.mark.slow
 def test_a_stop_while_a_link_is_trained_again_resumes_bit_for_bit(tmp_path):
     """An impossible standard of verification keeps the chain open until the budget ends."""
     options = {"method": "pbcs", "env_kwargs": MAZE, "seed": 2, "max_transitions": 150_000,
