@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -274,3 +275,6 @@ def test_a_model_is_called_untrue_only_where_both_samples_say_so(successes, beli
     assert reason is not None
     assert reason.startswith(f"{successes} of 100 executions with 10% random actions succeed, expected 95%")
     assert ("not true" in reason) == untrue
+    cut = replace(robust, endings={"goal": successes, "truncated": 100 - successes})
+    assert "not true" not in failure(nominal, cut, believed, CriterionSettings())
+    assert ("limit of steps" in failure(nominal, cut, believed, CriterionSettings())) == untrue
