@@ -9,6 +9,8 @@ from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
 from pbcs_ompl.resettable.feature_bounds import narrow_words
 
+MANY = 3
+"""A feature of more numbers is worth a hint."""
 TINY = 1e-30
 """Smaller numbers are the width of rounding around a bound of 0."""
 
@@ -42,6 +44,9 @@ def note_rules(model: ResettableModel) -> None:
     """Print on stderr what is explored and what is a success where an adapter, not the environment, decides it."""
     if isinstance(model.env, RestorableEnv):
         print_error(f"feature   {feature_words(model)}", f"goal      {goal_words(model)}")
+        if model.spec.feature is None and len(model.feature_low) > MANY:
+            print_error(f"hint      {len(model.feature_low)} numbers are explored; the fewer, the fewer transitions: "
+                        "choose those that matter, as in --feature 'obs[0:2]'")
 
 
 def _vector(values: Array) -> str:

@@ -58,7 +58,8 @@ def observed_type(env: Any, options: dict[str, Any] | None = None) -> np.dtype[A
             observation, _, terminated, truncated, _ = env.step(actions.sample())
         except Exception:  # what raises in steps is reported where steps are made
             return kind
-        if _type(observation, env.get_env_state()) != kind:
+        found = _type(observation, env.get_env_state())
+        if found is None or found != kind:  # None == np.dtype(np.float64)
             return None
         if terminated or truncated:
             break

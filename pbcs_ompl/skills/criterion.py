@@ -64,6 +64,9 @@ def failure(nominal: Evaluation, robust: Evaluation, believed: float, criterion:
         found = (f"{robust.successes} of {robust.episodes} executions with {robust.epsilon:.0%} random actions "
                  f"succeed, expected {criterion.robust_rate:.0%}")
     if robust.wilson[1] < wilson(round(believed * robust.episodes), robust.episodes)[0]:  # both are samples
-        found += (f"; in the model that it was trained in {believed:.0%} succeed, so the model is not true to the "
-                  f"environment: run pbcs doctor")
+        cut = robust.endings.get("truncated", 0)
+        mostly = cut > (robust.episodes - robust.successes) / 2
+        why = (f"{cut} were cut by the environment's limit of steps: shorten the plan (pbcs plan --improve), or "
+               "make the limit larger" if mostly else "so the model is not true to the environment: run pbcs doctor")
+        found += f"; in the model that it was trained in {believed:.0%} succeed, {'but ' if mostly else ''}{why}"
     return found

@@ -6,9 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium
+import numpy as np
 import pytest
 
 from pbcs_ompl.cli import main
+from pbcs_ompl.cli.models import note_rules
+from pbcs_ompl.resettable import adapt
 from pbcs_ompl.results.files import read_toml
 
 
@@ -35,6 +39,31 @@ def test_rules_go_where_the_plan_goes(tmp_path: Path, monkeypatch: pytest.Monkey
     assert json.loads(captured.out.splitlines()[-1])["replay_ok"]
     assert read_toml(tmp_path / "found/config.toml")["environment"] == {
         "id": "Pendulum-v1", "kwargs": {}, "goal": "obs[0]>0.99", "feature": "state", "start_seed": 3}
+
+
+@pytest.mark.parametrize(("numbers", "rule", "hint"), [(4, None, True), (3, None, False), (4, "obs[0:4]", False)])
+def test_many_numbers_to_explore_are_worth_a_hint(numbers: int, rule: str | None, hint: bool,
+                                                  capsys: pytest.CaptureFixture[str]) -> None:
+    class Point(gymnasium.Env):
+        action_space = observation_space = gymnasium.spaces.Box(-1.0, 1.0, (numbers,), np.float64)
+
+        def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
+            super().reset(seed=seed)
+            self.place = np.zeros(numbers)
+            return -self.place, {}
+
+        def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+            self.place = np.clip(self.place + 0.1 * action, -1.0, 1.0)
+            return -self.place, 0.0, False, False, {}
+
+        def get_env_state(self) -> np.ndarray:
+            return self.place.copy()
+
+        def set_env_state(self, state: np.ndarray) -> None:
+            self.place = np.array(state)
+
+    note_rules(adapt(Point(), feature=rule))
+    assert ("numbers are explored" in capsys.readouterr().err) == hint
 
 
 def test_a_process_without_mujoco(tmp_path: Path) -> None:

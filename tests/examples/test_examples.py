@@ -17,7 +17,7 @@ EXAMPLES = {
     "plain_ompl_car.py": ([], "OMPL's own check: True"),
     "look_at_a_critic.py": (["200"], "critic.png"),
     "stable_baselines_agent.py": ([], "solved: True"),
-    "continue_in_stable_baselines.py": (["20"], "success in stable-baselines3: 100%"),
+    "continue_in_stable_baselines.py": (["20", "200"], "success in stable-baselines3: 100%"),
     "ddpg_huber.py": ([], "solved: "),
     "robot_videos.py": (["quadrotor"], "runs/quadrotor.gif"),
     "train_ant_follower.py": (["run", "17000"], "of the test lines after"),

@@ -63,7 +63,8 @@ def project(tmp_path: Path) -> Path:
 
 
 def run(python: Path, project: Path, *words: str) -> str:
-    done = subprocess.run([python, *words], cwd=project, capture_output=True, text=True)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}  # which may lead here
+    done = subprocess.run([python, *words], cwd=project, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

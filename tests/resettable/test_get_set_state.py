@@ -180,6 +180,24 @@ def test_two_methods_are_enough() -> None:
     np.testing.assert_allclose(model.observe(np.concatenate([start[None], first, second])), [[-1.0], [0.01], [0.0125]])
 
 
+def test_an_observation_of_the_shape_of_the_state_is_not_taken_for_it() -> None:
+    class Mirrored(Cart):
+        observation_space = gymnasium.spaces.Box(-5.0, 5.0, (2,), np.float64)
+        observe = state_low = state_high = property()  # type: ignore[assignment]
+
+        def reset(self, **kwargs: Any) -> Any:
+            super().reset(**kwargs)
+            return -self.state, {}
+
+        def step(self, action: Any) -> Any:
+            _, *rest = super().step(action)
+            return -self.state, *rest
+
+    model = adapt(Mirrored())
+    after = model.transition(model.initial_state(0)[None], np.array([[1.0]])).states
+    np.testing.assert_allclose(model.observe(after), [[-0.01, -0.1]])
+
+
 def test_rules_read_the_state_of_an_environment_that_offers_it() -> None:
     model = adapt(Seen(), feature="state[0]", goal="state[1]>0.15")
     after = model.transition(model.initial_state(0)[None], np.array([[1.0]]))

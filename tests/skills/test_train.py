@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -50,6 +51,7 @@ def test_pbcs_solves_the_small_maze(tmp_path):
     assert json.loads((tmp_path / "run" / "result.json").read_text())["train_transitions"] == result.train_transitions
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_chain_in_a_fresh_process(tmp_path):
     script = ("import sys; from pbcs_ompl.skills import train; "
               "train('pbcs/Maze-v0', method='pbcs', env_kwargs={'size': 2}, seed=5, out=sys.argv[1])")
@@ -94,8 +96,9 @@ def test_a_training_that_was_stopped_or_killed_resumes_bit_for_bit(tmp_path, num
 
 
 @pytest.mark.parametrize(("method", "budget"), [("pbcs", 10_000_000), ("pb", 20_000), ("backplay", 20_000),
-                                                ("plain", 30_000), ("bootstrapped", 60_000),
-                                                ("offline", 30_000)])
+                                                ("plain", 30_000),
+                                                pytest.param("bootstrapped", 60_000, marks=pytest.mark.slow),
+                                                pytest.param("offline", 30_000, marks=pytest.mark.slow)])
 def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, method, budget):
     options = {"env_kwargs": MAZE, "seed": 1, "method": method, "max_transitions": budget}
     whole = train("pbcs/Maze-v0", **options)
@@ -109,6 +112,7 @@ def test_an_interrupted_training_resumes_bit_for_bit(tmp_path, method, budget):
     assert (tmp_path / "run" / "checkpoint.npz").exists() == (not result.complete)
 
 
+@pytest.mark.slow
 def test_a_stop_while_a_link_is_trained_again_resumes_bit_for_bit(tmp_path):
     """An impossible standard of verification keeps the chain open until the budget ends."""
     options = {"method": "pbcs", "env_kwargs": MAZE, "seed": 2, "max_transitions": 150_000,
@@ -271,3 +275,6 @@ def test_a_model_is_called_untrue_only_where_both_samples_say_so(successes, beli
     assert reason is not None
     assert reason.startswith(f"{successes} of 100 executions with 10% random actions succeed, expected 95%")
     assert ("not true" in reason) == untrue
+    cut = replace(robust, endings={"goal": successes, "truncated": 100 - successes})
+    assert "not true" not in failure(nominal, cut, believed, CriterionSettings())
+    assert ("limit of steps" in failure(nominal, cut, believed, CriterionSettings())) == untrue

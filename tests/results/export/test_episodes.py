@@ -75,6 +75,7 @@ def test_the_fields_that_reverse_curricula_read_are_there(plan: Path, chain: Pat
             np.testing.assert_array_equal(observation, demonstration["obs"][-1])
 
 
+@pytest.mark.slow
 def test_stable_baselines_continues_with_the_policy_and_the_transitions(tmp_path: Path) -> None:
     sb3 = pytest.importorskip("stable_baselines3")
     from pbcs_ompl.skills.chain import SkillChain

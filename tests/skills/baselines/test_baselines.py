@@ -139,6 +139,7 @@ def test_predictive_control_drives_one_episode_at_a_time(plan: Trajectory) -> No
         MPPIController(model_of(plan), plan, lambda: plan.states[0]).reset(2)
 
 
+@pytest.mark.slow
 def test_the_reverse_curriculum_moves_back_and_solves_a_short_plan() -> None:
     found = pbcs_ompl.plan("pbcs/Box-v0", "Rides", env_kwargs={"goal": [3.2, 2.5]}, seed=1)
     assert found.trajectory is not None

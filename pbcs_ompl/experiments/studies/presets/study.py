@@ -46,7 +46,7 @@ def run(settings: dict[str, Any]) -> dict[str, Any]:
                      for values in (method_values, agent_values))
     covered = [0.0]
     kwargs = {"size": size} | ({"maze_seed": seed} if size > 3 else {})
-    record, _ = trained("pbcs/Maze-v0", kwargs, preset=THESIS, settings=method, agent_settings=agent, seed=seed,
-                        on_progress=lambda state: covered.append(float(state.get("covered", covered[-1]))),
+    record, _ = trained("pbcs/Maze-v0", kwargs, method="pbcs", preset=THESIS, settings=method, agent_settings=agent,
+                        seed=seed, on_progress=lambda state: covered.append(float(state.get("covered", covered[-1]))),
                         **{key: settings[key] for key in ("planner", "max_transitions")})
     return settings | record | {"covered": covered[-1]}
