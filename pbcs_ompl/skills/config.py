@@ -155,11 +155,11 @@ class TrainConfig:
         Raises:
             UnknownName, InvalidOption: see the class; also a planner or a trajectory that is not used.
         """
-        method = str(read_preset(preset)["method"]) if method is None else method
-        entry = find_method(method)
+        chosen_method = str(read_preset(preset)["method"]) if method is None else method
+        entry = find_method(chosen_method)
         needs_plan = entry.needs_plan
         if not needs_plan and (planned or planner is not None or planner_kwargs):
-            raise InvalidOption(f"method {method!r} trains without a plan; remove trajectory, planner and "
+            raise InvalidOption(f"method {chosen_method!r} trains without a plan; remove trajectory, planner and "
                                 "planner_kwargs, or choose from "
                                 f"{', '.join(name for name, entry in METHODS.items() if entry.needs_plan)}")
         if planned and (planner is not None or planner_kwargs):
@@ -169,8 +169,8 @@ class TrainConfig:
         if isinstance(chosen, AgentSettings):
             versions["agent"] = preset_version(preset)
         used = (planner or entry.planner) if needs_plan and not planned else None
-        return cls(method, used, dict(planner_kwargs or {}), agent, preset, versions,
-                   method_settings(method, preset, settings), chosen, seed, max_transitions, device)
+        return cls(chosen_method, used, dict(planner_kwargs or {}), agent, preset, versions,
+                   method_settings(chosen_method, preset, settings), chosen, seed, max_transitions, device)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, as config.toml holds them."""

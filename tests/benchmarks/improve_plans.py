@@ -7,8 +7,8 @@
    what the improvement takes beside the search.
 2. Environments without a known shortest plan: median steps before and after.
 
-Every plan is executed in a fresh environment, and only these are counted. The constants of `bridge/improvement`
-were chosen on mazes 100 to 107 of 9x9 and 15x15.
+Every plan is executed in a fresh environment, and only these are counted. The constants of
+`bridge/improvement/improve.py` were chosen on mazes 100 to 107 of 9x9 and 15x15.
 """
 
 import argparse
