@@ -1,6 +1,7 @@
 """Training methods by name, and the configuration that a training is a function of."""
 
 import json
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ from pbcs_ompl.results.schema import check
 from pbcs_ompl.skills.agent_interface import Agent, AgentFactory, AgentSettingsValues, far_sighted, load_agent
 from pbcs_ompl.skills.method import TrainingMethod
 from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings
+from pbcs_ompl.skills.path_following.task import observes_feature
 from pbcs_ompl.skills.pbcs import PBCS, PBCSSettings
 from pbcs_ompl.skills.settings import MethodSettings, PlannedSettings, flat_names, read_preset
 from pbcs_ompl.skills.single_policy import (
@@ -70,6 +72,22 @@ def find_method(name: str) -> MethodEntry:
     if name not in METHODS:
         raise UnknownName("method", name, METHODS)
     return METHODS[name]
+
+
+def usual_method(preset: str, model: ResettableModel) -> str:
+    """Return the method of a preset; PBCS where it is path following and the model's feature is not observed.
+
+    Raises:
+        UnknownName: no such preset.
+        CallbackFailed: the environment raised.
+    """
+    method = str(read_preset(preset)["method"])
+    if method == "follow" and not observes_feature(model):
+        warnings.warn(f"{model.spec.id}: what is explored is no part of the observation, so no policy can follow a "
+                      "path; the method is pbcs (for the other, explore entries of the observation, such as "
+                      "--feature 'obs[0:2]')", stacklevel=3)
+        return "pbcs"
+    return method
 
 
 def method_settings(method: str, preset: str = "fast", changes: Mapping[str, Any] | None = None) -> MethodSettings:
@@ -144,7 +162,7 @@ class TrainConfig:
         choose_device(self.device)
 
     @classmethod
-    def resolve(cls, *, method: str | None, planner: str | None, planner_kwargs: Mapping[str, Any] | None, agent: str,
+    def resolve(cls, *, method: str, planner: str | None, planner_kwargs: Mapping[str, Any] | None, agent: str,
                 preset: str, settings: Mapping[str, Any] | None, agent_settings: Mapping[str, Any] | None, seed: int,
                 max_transitions: int, device: str, planned: bool) -> "TrainConfig":
         """Return the configuration that these choices of `train` stand for.
@@ -155,11 +173,10 @@ class TrainConfig:
         Raises:
             UnknownName, InvalidOption: see the class; also a planner or a trajectory that is not used.
         """
-        chosen_method = str(read_preset(preset)["method"]) if method is None else method
-        entry = find_method(chosen_method)
+        entry = find_method(method)
         needs_plan = entry.needs_plan
         if not needs_plan and (planned or planner is not None or planner_kwargs):
-            raise InvalidOption(f"method {chosen_method!r} trains without a plan; remove trajectory, planner and "
+            raise InvalidOption(f"method {method!r} trains without a plan; remove trajectory, planner and "
                                 "planner_kwargs, or choose from "
                                 f"{', '.join(name for name, entry in METHODS.items() if entry.needs_plan)}")
         if planned and (planner is not None or planner_kwargs):
@@ -169,8 +186,8 @@ class TrainConfig:
         if isinstance(chosen, AgentSettings):
             versions["agent"] = preset_version(preset)
         used = (planner or entry.planner) if needs_plan and not planned else None
-        return cls(chosen_method, used, dict(planner_kwargs or {}), agent, preset, versions,
-                   method_settings(chosen_method, preset, settings), chosen, seed, max_transitions, device)
+        return cls(method, used, dict(planner_kwargs or {}), agent, preset, versions,
+                   method_settings(method, preset, settings), chosen, seed, max_transitions, device)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, as config.toml holds them."""

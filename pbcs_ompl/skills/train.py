@@ -21,7 +21,7 @@ from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.checksums import changed_files
 from pbcs_ompl.results.files import CHECKPOINT, CONFIG, PLAN, RESULT, is_there, read_json, read_toml
 from pbcs_ompl.results.folder import RunFolder
-from pbcs_ompl.skills.config import TrainConfig, read_config
+from pbcs_ompl.skills.config import TrainConfig, read_config, usual_method
 from pbcs_ompl.skills.train_result import TrainResult
 from pbcs_ompl.skills.training import Training, training_versions
 
@@ -41,7 +41,7 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         env: A Gymnasium id, an `EnvSpec`, an environment, or its resettable model.
         trajectory: A plan made before.
         method: "pbcs", "follow", "pb", "backplay", "plain", "bootstrapped" or "offline"; None for that of the
-            preset: "follow" of "fast", "pbcs" of "thesis".
+            preset: "pbcs" of "thesis", and of "fast" "follow", or "pbcs" where the explored feature is not observed.
         agent: A registered agent, or module:Class.
         preset: Named settings of the method and of the agent: "fast" or "thesis".
         settings: Settings of the method that differ from the preset, by name ({"epsilon": 0.2}), by path
@@ -69,12 +69,12 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         RunFolderError: the folder exists, is in use, or cannot be written.
         CallbackFailed: the environment raised, or returned NaN.
     """
-    config = TrainConfig.resolve(
-        method=method, planner=planner, planner_kwargs=planner_kwargs, agent=agent, preset=preset, settings=settings,
-        agent_settings=agent_settings, seed=seed, max_transitions=max_transitions, device=device,
-        planned=trajectory is not None)
     model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options,
                  max_episode_steps=max_episode_steps)
+    config = TrainConfig.resolve(
+        method=method or usual_method(preset, model), planner=planner, planner_kwargs=planner_kwargs, agent=agent,
+        preset=preset, settings=settings, agent_settings=agent_settings, seed=seed, max_transitions=max_transitions,
+        device=device, planned=trajectory is not None)
     if trajectory is not None:
         trajectory.check_belongs_to(model)
     if planner is not None or planner_kwargs:

@@ -64,7 +64,7 @@ def test_hand_written_gradients_refuse_a_loss_that_they_do_not_have(kind) -> Non
 
 def test_it_trains_from_the_command_line(kind, tmp_path, capsys) -> None:
     code = main(["train", "--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 2}', "--agent",
-                 "examples.ddpg_huber:DDPGHuber", "--max-transitions", "12000", "--json",
+                 "examples.ddpg_huber:DDPGHuber", "--method", "pbcs", "--max-transitions", "12000", "--json",
                  "--out", str(tmp_path / "run")])
     result = json.loads(capsys.readouterr().out.strip().splitlines()[-1])
     assert code == 1

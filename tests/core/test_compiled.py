@@ -10,7 +10,7 @@ import pbcs_ompl
 from pbcs_ompl.core.compiled import kernel_files
 
 ROOT = Path(pbcs_ompl.__file__).parent
-LEAVES = {"replay.py", "coverage.py", "study.py"}
+LEAVES = {"replay.py", "coverage.py", "study.py", "sight.py"}
 """Files whose kernels no others call; Numba sees by itself when they change."""
 CALLED = """
 from pbcs_ompl.core import compiled

@@ -23,6 +23,7 @@ from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.resettable import make
 from pbcs_ompl.results.files import read_toml
 from pbcs_ompl.skills import Evaluation, SkillChain, resume, train
+from pbcs_ompl.skills.config import usual_method
 from pbcs_ompl.skills.criterion import failure
 from pbcs_ompl.skills.policy import policy_to_arrays
 from pbcs_ompl.skills.settings import CriterionSettings
@@ -52,6 +53,15 @@ def test_pbcs_solves_the_small_maze(tmp_path):
 
 
 @pytest.mark.slow
+def test_the_usual_method_is_path_following_where_the_feature_is_observed():
+    assert usual_method("fast", make("pbcs/Maze-v0", MAZE)) == "follow"
+    assert usual_method("thesis", make("pbcs/Maze-v0", MAZE)) == "pbcs"
+    pendulum = {"goal": "reward>-0.01"}
+    with pytest.warns(UserWarning, match="the method is pbcs"):
+        assert usual_method("fast", make("Pendulum-v1", **pendulum)) == "pbcs"
+    assert usual_method("fast", make("Pendulum-v1", **pendulum, feature="obs")) == "follow"
+
+
 def test_the_same_seed_gives_the_same_chain_in_a_fresh_process(tmp_path):
     script = ("import sys; from pbcs_ompl.skills import train; "
               "train('pbcs/Maze-v0', method='pbcs', env_kwargs={'size': 2}, seed=5, out=sys.argv[1])")

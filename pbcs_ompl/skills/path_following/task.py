@@ -6,6 +6,7 @@ from typing import Self
 
 import numpy as np
 
+from pbcs_ompl.core.callbacks import code_of_others
 from pbcs_ompl.core.errors import InvalidState, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
@@ -19,6 +20,8 @@ LOOKS = (1.0, 2.0, 4.0)
 """How far policies look ahead, in multiples of `LineSettings.look_ahead`."""
 STEP_QUANTILE = 0.9
 """Of the movements in a step along a plan, the one that is the unit: a blow against a wall is larger than a step."""
+WALK = 20
+"""Steps of the random walk that shows whether the feature is observed."""
 TOLERANCE = 1e-5
 """Largest difference between a feature and the entry of the observation that shows it, relative to its size."""
 
@@ -244,6 +247,26 @@ def extended(corners: Array, length: float) -> Array:
     hop = corners[-1] - corners[-2]
     size = float(np.linalg.norm(hop))
     return np.concatenate([corners, (corners[-1] + hop * (length / size))[None]]) if size > 0 else corners
+
+
+def observes_feature(model: ResettableModel) -> bool:
+    """Return whether every dimension of the feature is an entry of the observation, in states of a short random walk.
+
+    Raises:
+        CallbackFailed: the environment raised.
+    """
+    rng = np.random.default_rng(0)
+    with code_of_others("the environment"):
+        states = [model.initial_state(0)]
+        for control in rng.uniform(model.action_low, model.action_high, (WALK, len(model.action_low))):
+            outcome = model.transition(states[-1][None], control[None])
+            states.append(model.initial_state(0) if outcome.ended[0] else outcome.states[0])
+        observations = model.observe(np.array(states))
+    try:
+        feature_entries(model, np.array(states), observations)
+    except Mismatch:
+        return False
+    return True
 
 
 def feature_entries(model: ResettableModel, states: Array, observations: Array) -> IndexArray:

@@ -213,7 +213,8 @@ def test_the_command_line_trains_and_evaluates(tmp_path: Path, capsys: pytest.Ca
     assert main(["train", "--resume", out, "--max-transitions", "24000", "--json"]) == 0
     assert 19_000 < json.loads(capsys.readouterr().out)["transitions"] <= 24_000
     for wrong, message in ((["eval", out], "--path PLAN"), ([*train, "--agent", "td3"], "--agent says nothing"),
-                           ([*train[:1], "--lines", "random", "--env", "pbcs/Maze-v0"], "--method follow"),
+                           ([*train[:1], "--method", "pb", "--lines", "random", "--env", "pbcs/Maze-v0"],
+                            "--method follow"),
                            ([*train[:1], "--env", "pbcs/Maze-v0", "--worlds", '[{"size": 3}]'], "--lines random")):
         assert main(wrong) == 2
         assert message in capsys.readouterr().err
