@@ -52,7 +52,6 @@ def test_pbcs_solves_the_small_maze(tmp_path):
     assert json.loads((tmp_path / "run" / "result.json").read_text())["train_transitions"] == result.train_transitions
 
 
-@pytest.mark.slow
 def test_the_usual_method_is_path_following_where_the_feature_is_observed():
     assert usual_method("fast", make("pbcs/Maze-v0", MAZE)) == "follow"
     assert usual_method("thesis", make("pbcs/Maze-v0", MAZE)) == "pbcs"
@@ -62,6 +61,7 @@ def test_the_usual_method_is_path_following_where_the_feature_is_observed():
     assert usual_method("fast", make("Pendulum-v1", **pendulum, feature="obs")) == "follow"
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_chain_in_a_fresh_process(tmp_path):
     script = ("import sys; from pbcs_ompl.skills import train; "
               "train('pbcs/Maze-v0', method='pbcs', env_kwargs={'size': 2}, seed=5, out=sys.argv[1])")
