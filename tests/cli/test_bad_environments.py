@@ -118,7 +118,7 @@ def test_a_path_of_another_mujoco(capsys: pytest.CaptureFixture[str]) -> None:
     words = json.loads(str(arrays["metadata"]))
     words["versions"]["mujoco"] = "3.3.0"
     write_arrays(Path("found/trajectory.npz"), **arrays | {"metadata": np.array(json.dumps(words))})
-    line = complaint("train --env pbcs/SparseHalfCheetah-v0 --path found --out trained", 2, capsys)
+    line = complaint("train --method pbcs --env pbcs/SparseHalfCheetah-v0 --path found --out trained", 2, capsys)
     assert "made with mujoco 3.3.0, installed is" in line
     assert "plan again, or install that version" in line
 
