@@ -17,6 +17,7 @@ from pbcs_ompl.resettable import adapt, check_resettable
 from pbcs_ompl.resettable.adapters.restorable import GUARD_EVERY
 from pbcs_ompl.resettable.branching import LONG, first_difference
 from pbcs_ompl.resettable.memory.code import names_of
+from pbcs_ompl.resettable.memory.exploration import ABSENT, Seen
 from pbcs_ompl.resettable.memory.plain_values import enum_name, from_text, pack, same, size_for, to_text, unpack
 from tests.resettable.toys import Cart, Line, walk
 
@@ -340,3 +341,10 @@ def test_numbers_that_are_not_finite_are_restored() -> None:
     model: Any = adapt(Closest())
     assert np.isfinite(model.initial_state(0)).all()
     assert first_difference(model.env, Closest, steps=LONG, seed=5) == ""
+
+
+def test_an_attribute_may_be_absent_for_several_steps() -> None:
+    seen = Seen([1])
+    for value in (ABSENT, ABSENT, [1]):
+        seen.add(value, "step")
+    assert seen.changes

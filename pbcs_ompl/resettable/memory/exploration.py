@@ -45,7 +45,7 @@ class Seen:
     def add(self, value: Any, event: Event) -> None:
         """Compare with the value before, and keep the new one."""
         self.is_one_object = self.is_one_object and value is self.object
-        if same(self.last, value):
+        if value is self.last or same(self.last, value):  # that an attribute is absent is no plain value
             return
         self.in_step, self.in_reset = self.in_step or event == "step", self.in_reset or event == "reset"
         self.last = _copy(value)
@@ -183,4 +183,6 @@ def text_length(value: Any) -> int:
 def _copy(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.copy()
+    if value is ABSENT:
+        return value
     return deepcopy(value) if type(value) in (list, tuple, dict, set) or not is_plain(value) else value
