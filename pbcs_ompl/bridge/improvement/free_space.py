@@ -75,8 +75,8 @@ class FreeSpace:
 
         points = (self._motion.in_steps(states[index]) - self._low) / self._edges
         before, straight = shortest_way(np.clip(points, 0.0, self._shape - 1e-6), index, self._motion.low / self._edges,
-                                    self._motion.high / self._edges, LONGEST, self._likely_blocked().ravel(),
-                                    self._shape)
+                                         self._motion.high / self._edges, LONGEST, self._likely_blocked().ravel(),
+                                         self._shape)
         found, at = [], len(index) - 1
         while at > 0:
             if straight[at]:

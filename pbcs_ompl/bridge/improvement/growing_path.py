@@ -30,8 +30,8 @@ class GrowingPath:
     def spliced(self, cut: ShortCut, path: "GrowingPath") -> "GrowingPath":
         """Return a copy with a path in place of the steps from cut.first to cut.last."""
         return GrowingPath(self.states[:cut.first] + path.states + self.states[cut.last + 1:],
-                     self.controls[:cut.first] + path.controls + self.controls[cut.last:],
-                     self.rewards[:cut.first] + path.rewards + self.rewards[cut.last:])
+                           self.controls[:cut.first] + path.controls + self.controls[cut.last:],
+                           self.rewards[:cut.first] + path.rewards + self.rewards[cut.last:])
 
     def cut_to(self, steps: int) -> None:
         """Keep the first steps."""
