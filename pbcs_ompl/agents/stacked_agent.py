@@ -80,6 +80,12 @@ class StackedAgent(ABC):
     outputs_per_action: ClassVar[int] = 1
     num_critics: ClassVar[int] = 1
 
+    def __init_subclass__(cls) -> None:
+        """Let no kernel stand for an `update` that it was not written for."""
+        super().__init_subclass__()
+        if "update" in vars(cls) and "kernel" not in vars(cls):
+            cls.kernel = None
+
     def __init__(self, observation_size: int, action_low: Any, action_high: Any, *,
                  settings: AgentSettings | None = None, seeds: Sequence[int] = (0,),
                  device: str | torch.device = "cpu", compile: Compile = "auto"):

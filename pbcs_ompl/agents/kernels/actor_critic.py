@@ -1,8 +1,8 @@
 """The steps of which updates of actor-critic algorithms are made, for one seed on a CPU.
 
 A critic takes observations and actions side by side, called pairs here. `rows` are those of a mini-batch [B, W], see
-`Replay.unpack`; rates are rows of `adam_rates`. All functions are inlined in the update that calls them: LLVM optimises a
-function again in each of its callers.
+`Replay.unpack`; rates are rows of `adam_rates`. All functions are inlined in the update that calls them: LLVM optimises
+a function again in each of its callers.
 """
 
 from typing import NamedTuple
@@ -17,7 +17,7 @@ class Stack(NamedTuple):
     """A `TrainedNetwork` in plain arrays [N * P]."""
 
     shape: nets.Shape
-    count: int
+    total: int
     """Networks N: one of each seed, or the first ones of all seeds, then the second ones."""
     weights: np.ndarray
     target: np.ndarray
@@ -58,9 +58,9 @@ def new_scratch(actor: Stack, critic: Stack, batch: int) -> Scratch:
     """Allocate working memory."""
     short, long = nets.num_activations(actor.shape, batch), nets.num_activations(critic.shape, batch)
     return Scratch(np.empty(short, np.float32), np.empty(short, np.float32),
-                   np.empty(len(actor.weights) // actor.count, np.float32),
-                   np.empty((critic.count // actor.count, long), np.float32), np.empty(long, np.float32),
-                   np.empty(len(critic.weights) // critic.count, np.float32),
+                   np.empty(len(actor.weights) // actor.total, np.float32),
+                   np.empty((critic.total // actor.total, long), np.float32), np.empty(long, np.float32),
+                   np.empty(len(critic.weights) // critic.total, np.float32),
                    np.empty(batch, np.float32), np.empty(batch, np.int64), np.empty(batch, np.float32))
 
 
@@ -83,7 +83,7 @@ def run_actor(actor: Stack, flat: np.ndarray, seed: int, rows: np.ndarray, first
         for i in range(size):
             scratch.actor_activations[item * size + i] = rows[item, first + i]
             pairs[item * pair + i] = rows[item, first + i]
-    nets.forward(actor.shape, flat, nets.Member(actor.count, seed), scratch.actor_activations, batch)
+    nets.forward(actor.shape, flat, nets.Member(actor.total, seed), scratch.actor_activations, batch)
 
 
 @njit(inline="always")
@@ -117,7 +117,7 @@ def least_values(critic: Stack, flat: np.ndarray, seed: int, scratch: Scratch) -
         activations = scratch.critic_activations[twin]
         for i in range(inputs if twin > 0 else 0):
             activations[i] = scratch.critic_activations[0, i]
-        member = nets.Member(critic.count, twin * (critic.count // twins) + seed)
+        member = nets.Member(critic.total, twin * (critic.total // twins) + seed)
         nets.forward(critic.shape, flat, member, activations, batch)
         for item in range(batch):
             # A value that is not a number stays the least.
@@ -134,7 +134,7 @@ def set_targets(rows: np.ndarray, pair: int, constants: Constants, scratch: Scra
 
 
 @njit(inline="always")
-def critic_step(rows: np.ndarray, seed: int, critic: Stack, rate: np.ndarray, scratch: Scratch) -> float:
+def critic_step(rows: np.ndarray, seed: int, critic: Stack, rate: np.ndarray, scratch: Scratch) -> np.float32:
     """Make a step of each critic of a seed towards the targets; return the sum of their losses."""
     batch, pair, twins = len(rows), critic.shape.sizes[0], len(scratch.critic_activations)
     activations, out = scratch.critic_activations[0], nets.outputs_offset(critic.shape, batch)
@@ -143,7 +143,7 @@ def critic_step(rows: np.ndarray, seed: int, critic: Stack, rate: np.ndarray, sc
             activations[item * pair + i] = rows[item, i]
     loss = np.float32(0.0)
     for twin in range(twins):
-        member = nets.Member(critic.count, twin * (critic.count // twins) + seed)
+        member = nets.Member(critic.total, twin * (critic.total // twins) + seed)
         nets.forward(critic.shape, critic.weights, member, activations, batch)
         for item in range(batch):
             error = activations[out + item] - scratch.targets[item]
@@ -152,19 +152,18 @@ def critic_step(rows: np.ndarray, seed: int, critic: Stack, rate: np.ndarray, sc
         nets.backward(critic.shape, critic.weights, member, activations, scratch.critic_grads, batch,
                       scratch.critic_gradient)
         nets.adam_step(critic.shape, critic.weights, critic.mean, critic.square, member, scratch.critic_gradient, rate)
-    mean: float = loss / batch
-    return mean
+    return loss / np.float32(batch)
 
 
 @njit(inline="always")
 def policy_step(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, rate: np.ndarray, constants: Constants,
-                scratch: Scratch) -> float:
+                scratch: Scratch) -> np.float32:
     """Make a step of a seed's actor along the gradient of its first critic; return its loss."""
     batch, pair, actions = len(rows), critic.shape.sizes[0], len(constants.half)
     activations, out = scratch.critic_activations[0], nets.outputs_offset(critic.shape, batch)
     run_actor(actor, actor.weights, seed, rows, 0, pair, scratch)
     set_actions(actor, np.empty((0, 0), np.float32), pair, constants, scratch)
-    member = nets.Member(critic.count, seed)
+    member = nets.Member(critic.total, seed)
     nets.forward(critic.shape, critic.weights, member, activations, batch)
     loss = np.float32(0.0)
     for item in range(batch):
@@ -179,14 +178,13 @@ def policy_step(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, rate: 
             grad = scratch.critic_grads[item * pair + pair - actions + a] * constants.half[a]
             scratch.actor_grads[out + item * actions + a] = grad * (np.float32(1.0) - squashed * squashed)
     actor_step(actor, seed, rate, scratch)
-    mean: float = loss / batch
-    return mean
+    return loss / np.float32(batch)
 
 
 @njit(inline="always")
 def actor_step(actor: Stack, seed: int, rate: np.ndarray, scratch: Scratch) -> None:
     """Make a step of a seed's actor, for the gradients of its outputs."""
-    member = nets.Member(actor.count, seed)
+    member = nets.Member(actor.total, seed)
     nets.backward(actor.shape, actor.weights, member, scratch.actor_activations, scratch.actor_grads,
                   len(scratch.values), scratch.actor_gradient)
     nets.adam_step(actor.shape, actor.weights, actor.mean, actor.square, member, scratch.actor_gradient, rate)
@@ -196,5 +194,5 @@ def actor_step(actor: Stack, seed: int, rate: np.ndarray, scratch: Scratch) -> N
 def update_targets(stack: Stack, seed: int, copies: int, tau: np.float32) -> None:
     """Move the target networks of a seed, of which the stack has some copies."""
     for copy in range(copies):
-        member = nets.Member(stack.count, copy * (stack.count // copies) + seed)
+        member = nets.Member(stack.total, copy * (stack.total // copies) + seed)
         nets.polyak_update(stack.shape, stack.weights, stack.target, member, tau)

@@ -1,4 +1,4 @@
-"""Layer norm and its derivative, for one network on a CPU: n = (v - mean(v)) / sqrt(variance(v) + epsilon), gain n + shift.
+"""Layer norm and its derivative, for one network on a CPU: gain n + shift, n = (v - mean) / sqrt(variance + epsilon).
 
 Source: Ba, Kiros and Hinton (2016), Eqs. 3 and 4; epsilon as in torch.nn.LayerNorm.
 """

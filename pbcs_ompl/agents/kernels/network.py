@@ -36,9 +36,9 @@ def shape_of(sizes: tuple[int, ...], layer_norm: bool) -> Shape:
 class Member(NamedTuple):
     """One network of a stack."""
 
-    count: int
+    total: int
     """Networks of the stack."""
-    index: int
+    place: int
     """Which of them."""
 
 
@@ -72,9 +72,9 @@ def parameter_offsets(shape: Shape, layer: int, member: Member) -> tuple[int, in
     for before in range(layer):
         start += (sizes[before] + num_blocks(shape, before) - 1) * sizes[before + 1]
     block, width = sizes[layer] * sizes[layer + 1], sizes[layer + 1]
-    bias = member.count * (start + block) + member.index * width
-    return (member.count * start + member.index * block, bias, bias + member.count * width,
-            bias + 2 * member.count * width)
+    bias = member.total * (start + block) + member.place * width
+    return (member.total * start + member.place * block, bias, bias + member.total * width,
+            bias + 2 * member.total * width)
 
 
 @njit(fastmath=FAST)

@@ -109,8 +109,9 @@ def _log_density(inner: np.float32, log_std: np.float32, noise: np.float32) -> n
 
 @njit(inline="always")
 def soft_policy_step(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, rate: np.ndarray, noise: np.ndarray,
-                     temperature: np.float32, constants: Constants, scratch: Scratch, density: np.ndarray) -> float:
-    """Make a step of a seed's actor against `losses.soft_policy_loss`; return the loss, and fill the densities [B]."""
+                     temperature: np.float32, constants: Constants, scratch: Scratch,
+                     density: np.ndarray) -> np.float32:
+    """Make a step of a seed's actor against `losses.soft_policy_loss`; return it, and fill the densities [B]."""
     batch, pair, actions = len(rows), critic.shape.sizes[0], len(constants.half)
     run_actor(actor, actor.weights, seed, rows, 0, pair, scratch)
     draw_actions(actor, noise, pair, constants, scratch, density)
@@ -135,8 +136,7 @@ def soft_policy_step(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, r
             scratch.actor_grads[place + actions + a] = by_log_std if inside else np.float32(0.0)
         place += 2 * actions
     actor_step(actor, seed, rate, scratch)
-    mean: float = loss / batch
-    return mean
+    return loss * part
 
 
 @njit(inline="always")
@@ -151,7 +151,7 @@ def _add_least_gradient(twin: int, seed: int, actor: Stack, critic: Stack, const
     for item in range(batch):
         chosen = scratch.least[item] == twin
         scratch.critic_grads[out + item] = np.float32(-1.0 / batch) if chosen else np.float32(0.0)
-    member = nets.Member(critic.count, twin * (critic.count // len(scratch.critic_activations)) + seed)
+    member = nets.Member(critic.total, twin * (critic.total // len(scratch.critic_activations)) + seed)
     nets.backward(critic.shape, critic.weights, member, scratch.critic_activations[twin], scratch.critic_grads, batch,
                   np.empty(0, np.float32))
     for item in range(batch):
