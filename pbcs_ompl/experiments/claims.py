@@ -217,7 +217,7 @@ def _medians(names: tuple[str, str], *columns: np.ndarray) -> dict[str, Any]:
 def _fisher(first: Rate, second: Rate) -> float:
     """Return p of the one-sided test that the first rate is higher."""
     wins, trials = first["successes"] + second["successes"], first["n"] + second["n"]
-    return float(hypergeom.sf(first["successes"] - 1, trials, wins, first["n"]))
+    return float(hypergeom.sf(first["successes"] - 1, trials, wins, first["n"])) if trials else 1.0
 
 
 @cache
