@@ -56,7 +56,7 @@ def test_what_was_there_at_once_counts_neither_for_the_rate_nor_for_the_time_lef
     with ProgressDisplay("study", count="runs", budget=100) as display:
         for count in (80, 82):
             display({"runs": count})
-    assert capsys.readouterr().err == "study: runs 82, 0.0976 runs/s, at most 3 min 4 s left\n"
+    assert capsys.readouterr().err == "study: runs 82, 0.0976 runs/s, at most 3 min 5 s left\n"
 
 
 TABLE = [{"planner": "Ex", "runs": "3/4", "median": 1234.5}, {"planner": "RRT", "runs": "0/4", "median": "-"}]
