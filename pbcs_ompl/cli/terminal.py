@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from pbcs_ompl.cli.bar import Bar
 
 SECONDS_BETWEEN_LINES = 10.0
+FORESEEN, SETTLED = 0.05, 5.0
+"""The time left is shown once this share is done, or after this many seconds: before, it is a wild guess."""
 
 
 class ProgressDisplay:
@@ -74,8 +76,10 @@ class ProgressDisplay:
                  if name not in ("seconds", "covered", "table")]
         if seconds > 0 and self._count in numbers:
             parts.append(f"{format_number(numbers[self._count] / seconds)} {self._count}/s")
-        if share:
-            bound = f"{share:.0%} of the plan covered, about" if "covered" in numbers else "at most"
+        if share and "covered" in numbers:
+            parts.append(f"{share:.0%} of the plan covered")
+        if share and (share >= FORESEEN or seconds >= SETTLED):
+            bound = "about" if "covered" in numbers else "at most"
             parts.append(f"{bound} {format_duration(seconds * (1 - share) / share)} left")
         return ", ".join(parts)
 
