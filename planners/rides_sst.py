@@ -24,7 +24,8 @@ class RidesSST(SSTCompiled):
     Args:
         bin_size: Edge length of the bins of Rides, one for all features or one for each; by default what the problem
             suggests.
-        selection_radius, pruning_radius: See SSTCompiled.
+        selection_radius: How near to a random feature SST expands the cheapest node, in bins that the problem suggests.
+        pruning_radius: Within which distance of a witness only the cheapest node is kept, in bins.
 
     Raises:
         InvalidOption: on `start`, for a feature space without finite bounds.

@@ -1,7 +1,7 @@
 """How long are plans after 1, 2, 5 and 10 times the transitions that Rides needs for its first one?
 
     python tests/benchmarks/anytime.py [5x5] [9x9] [15x15] [MountainCar] [CarPark] [Quadrotor]
-                                       [--first-seed 8000] [--seeds 20]
+                                       [--first-seed 8000] [--seeds 20] [--improved Rides]
 
 Planners that continue after their first solution (SSTCompiled, RidesSST) beside searches whose plan is made shorter
 afterwards (`--improve`). The unit of the budgets is what Rides needs with the same seed. In mazes lengths are divided
@@ -29,7 +29,7 @@ TIMES = (1, 2, 5, 10)
 MAZES = {"5x5": 5, "9x9": 9, "15x15": 15}
 ENVIRONMENTS = {"MountainCar": "MountainCarContinuous-v0", "CarPark": "pbcs/CarPark-v0",
                 "Quadrotor": "pbcs/PlanarQuadrotor-v0"}
-IMPROVED, CONTINUING = ("Rides", "Ex"), ("SSTCompiled", "RidesSST")
+CONTINUING = ("SSTCompiled", "RidesSST")
 
 
 def lengths(found: PlanResult, budgets: list[int]) -> list[float]:
@@ -46,18 +46,21 @@ def lengths(found: PlanResult, budgets: list[int]) -> list[float]:
             for budget in budgets]
 
 
-def measured(name: str, seed: int) -> dict[str, list[float]]:
-    """Return the lengths of all planners at all budgets, for one seed."""
+def measured(name: str, seed: int, improved: list[str]) -> dict[str, list[float]]:
+    """Return the lengths of all planners at all budgets.
+
+    Args:
+        name: Of the table.
+        seed: Of the maze too.
+        improved: Planners whose plans are made shorter afterwards.
+    """
     size = MAZES.get(name)
-    env, options = ENVIRONMENTS.get(name, "pbcs/Maze-v0"), {"seed": seed}
-    least, kwargs = 1, {}
-    if size:
-        kwargs, least = {"size": size, "maze_seed": seed}, least_steps(MazeEnv(size, seed))
-    options |= {"env_kwargs": kwargs}
+    env, least = ENVIRONMENTS.get(name, "pbcs/Maze-v0"), least_steps(MazeEnv(size, seed)) if size else 1
+    options: dict[str, Any] = {"seed": seed, "env_kwargs": {"size": size, "maze_seed": seed} if size else {}}
     unit = plan(env, "Rides", **options).transitions
     budgets = [times * unit for times in TIMES]
     found: dict[str, Any] = {f"{planner} --improve": plan(env, planner, improve=budgets[-1] - unit, **options)
-                             for planner in IMPROVED}
+                             for planner in improved}
     found |= {planner: plan(env, planner, max_transitions=budgets[-1], **options) for planner in CONTINUING}
     return {row: [length / least for length in lengths(one, budgets)] for row, one in found.items()}
 
@@ -76,14 +79,18 @@ def main() -> None:
     parser.add_argument("tables", nargs="*", default=[*MAZES, *ENVIRONMENTS])
     parser.add_argument("--first-seed", type=int, default=8000)
     parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--improved", nargs="*", default=["Rides"], help="planners whose plans are made shorter")
     arguments = parser.parse_args()
     for table in arguments.tables:
-        runs = [measured(table, seed) for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)]
+        runs = [measured(table, seed, arguments.improved)
+                for seed in range(arguments.first_seed, arguments.first_seed + arguments.seeds)]
         print(f"{table}, {len(runs)} seeds from {arguments.first_seed}\n{'':<18}"
               + "".join(f"{f'{times} x':<26}" for times in TIMES), flush=True)
         rows = {row: np.array([run[row] for run in runs]) for row in runs[0]}
         for row, values in rows.items():
             print(f"{row:<18}" + "".join(f"{interval(column):<26}" for column in values.T), flush=True)
+        if "Rides --improve" not in rows:
+            continue
         words = []
         for ours, theirs in zip(rows["RidesSST"].T, rows["Rides --improve"].T, strict=True):
             shorter, differ = int((ours < theirs).sum()), int((ours != theirs).sum())
