@@ -63,6 +63,12 @@ class PlanResult:
         coverage: How much of the feature space was seen after how many transitions; None unless asked for.
         improvement: What making the plan shorter has brought and used beside the search, whose numbers the others are,
             or what a planner has that continues after its first solution (such as SSTCompiled); else None.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.plan("pbcs/Maze-v0", "KPIECE1", seed=0)
+        >>> result.path_length == len(result.trajectory.actions)
+        True
     """
 
     solved: bool
@@ -128,6 +134,12 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "R
         PlannerUnavailable: the installed OMPL cannot build the planner.
         CallbackFailed: the environment or the strategy raised, or returned NaN.
         RunFolderError: `out` exists, is in use, or cannot be written.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.plan("pbcs/Maze-v0", env_kwargs={"size": 3}, seed=0)
+        >>> result.solved, result.replay_ok
+        (True, True)
     """
     limits = checked_limits(max_transitions, max_seconds)
     allowance = None if improve is None else Allowance.of(improve)
