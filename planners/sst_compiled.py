@@ -20,7 +20,7 @@ from pbcs_ompl.planners.planner import Strategy
 class SSTCompiled(Strategy):
     """Expand the cheapest node near a random feature; of nodes near to each other keep only the cheapest.
 
-    Source: SST (Li, Littlefield and Bekris 2016), Alg. 5 to 8. The cost of a node is the steps to it.
+    Source: SST (Li, Littlefield and Bekris 2016). The cost of a node is the steps to it.
 
     Differs: distances are those of features, in bins, instead of states. Near a random feature are the nodes whose
     witnesses are. Nothing is removed: nodes that are not the cheapest are only not expanded any more, as those that

@@ -6,7 +6,7 @@ from pbcs_ompl.planners.planner import Strategy
 
 
 class PlainSST(Strategy):
-    """Li, Littlefield and Bekris 2016, Alg. 5 to 8, with distances of features in bins and steps as costs."""
+    """Li, Littlefield and Bekris 2016, with distances of features in bins and steps as costs."""
 
     continues = True
 
