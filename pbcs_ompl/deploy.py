@@ -251,15 +251,41 @@ class _Follower:
         self._unit, self._origin, self._scale = arrays["unit"], arrays["origin"], arrays["scale"]
         self._patience, self._reach = words["patience"], np.arange(words["reach"] + 1)
         self._pass_radius = arrays.get("pass_radius", np.inf)  # of older files
+        self._periods: Array | None = arrays.get("periods")
+        self._sines: Indices | None = arrays.get("sines")
 
     def step(self, observations: Array, memory: Memory) -> Step:
         """Return what networks see [B, I], which one acts [B], and no side."""
-        places = observations[:, self._entries] / self._unit
-        self._advance(places, memory)
-        ahead = self._ahead(places, memory["pointer"])
-        inputs = np.concatenate([(observations - self._origin) / self._scale, ahead.reshape(len(ahead), -1),
+        places = self._places(observations)
+        self._advance(self._unwound(places, memory["pointer"]), memory)
+        unwound = self._unwound(places, memory["pointer"])
+        ahead = self._ahead(unwound, memory["pointer"])
+        seen = observations if self._periods is None else self._moved(observations, unwound - places)
+        inputs = np.concatenate([(seen - self._origin) / self._scale, ahead.reshape(len(ahead), -1),
                                  self._stalled(memory)], axis=1)
         return inputs, np.searchsorted(self._firsts, memory["pointer"], side="right") - 1, None
+
+    def _places(self, observations: Array) -> Array:
+        """Return where observations are [B, F], in the unit of the line: entries, and angles by cosine and sine."""
+        shown = observations[:, self._entries]
+        if self._sines is not None:
+            angles = self._sines >= 0
+            shown[:, angles] = np.arctan2(observations[:, self._sines[angles]], shown[:, angles])
+        return np.asarray(shown / self._unit)
+
+    def _unwound(self, places: Array, pointer: Indices) -> Array:
+        """Return places [B, F] moved by whole periods to where they are nearest to the points at pointers [B]."""
+        if self._periods is None:
+            return places
+        turns = np.rint((places - self.line[pointer]) / np.where(self._periods > 0.0, self._periods, np.inf))
+        return np.asarray(places - self._periods * turns)
+
+    def _moved(self, observations: Array, shifts: Array) -> Array:
+        """Return observations of which the entries that are places are larger by `shifts` [B, F] of them."""
+        plain = np.full(len(self._entries), True) if self._sines is None else self._sines < 0
+        moved = observations.copy()
+        moved[:, self._entries[plain]] += (shifts * self._unit)[:, plain]
+        return moved
 
     def _advance(self, places: Array, memory: Memory) -> None:
         """Move the pointers to the nearest points of those ahead, and count the steps since they moved last."""

@@ -20,6 +20,7 @@ from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings
 from pbcs_ompl.skills.path_following.follower import Progress, Relay
+from pbcs_ompl.skills.path_following.shown_feature import observes_feature
 from pbcs_ompl.skills.path_following.task import FollowTask, LineSettings, Position, around_last_progress, extended
 from pbcs_ompl.skills.path_following.verdict import Trouble, Verdict
 from pbcs_ompl.skills.trainer import SkillTrainer
@@ -203,14 +204,59 @@ def test_a_line_continues_in_the_direction_in_which_the_plan_ends() -> None:
     np.testing.assert_array_equal(extended(still, 4.0), still)
 
 
-def test_a_feature_that_is_not_observed_is_refused() -> None:
-    pendulum = make("Pendulum-v1")
+def test_what_policies_see_of_an_angle_does_not_jump() -> None:
+    """A car turns by nearly a whole turn: whether it counts turns or not, the line leads on, and the policy sees it."""
+    model = make("pbcs/CarPark-v0", {"obstacles": [], "start": [4.0, 4.0, 2.0]})
+    states = [model.initial_state(0)[None]]
+    for step in range(55):
+        states.append(model.transition(states[-1], np.array([[float(step < 4), 1.0]])).states)
+    plan = np.concatenate(states)
+    assert np.abs(np.diff(plan[:, 2])).max() > 6.0
+    task = FollowTask.of(model, plan, LineSettings())
+    seen = task.inputs(task.at(np.arange(len(plan))))
+    assert np.abs(np.diff(seen, axis=0))[5:].max() < 0.6
+    assert np.abs(seen[:, 6:-1]).max() < 10.0
+    turned = plan + 2.0 * np.pi * np.eye(4)[2]
+    position = task.at(np.arange(len(plan)))
+    other = Position(turned, model.observe(turned), position.progress)
+    np.testing.assert_allclose(task.inputs(other), task.inputs(position), atol=1e-9)
+    moved = task.line.advance(task.view.features(other.observations), position.progress.pointers, 4.0)
+    np.testing.assert_array_equal(
+        moved, task.line.advance(task.view.features(position.observations), position.progress.pointers, 4.0))
+
+
+def of_no_entry(outcome: Any) -> np.ndarray:
+    """The feature is the angle of a pendulum to the third power."""
+    return np.array([outcome.env.state[0] ** 3, outcome.env.state[1]])
+
+
+def swung(feature: Any = None) -> tuple[Any, np.ndarray]:
+    """A pendulum, and states of it under full torque."""
+    pendulum = make("Pendulum-v1", feature=feature)
     states = [pendulum.initial_state(0)[None]]
-    for _ in range(5):
+    for _ in range(60):
         states.append(pendulum.transition(states[-1], pendulum.action_high[None]).states)
+    return pendulum, np.concatenate(states)
+
+
+def test_a_feature_that_is_not_observed_is_refused() -> None:
+    pendulum, states = swung(of_no_entry)
+    assert not observes_feature(pendulum)
     with pytest.raises(Mismatch, match=r"Pendulum-v1: dimension 0 of the feature is no entry of the observation.*"
                                        r"--feature 'obs\[0:3\]'"):
-        FollowTask.of(pendulum, np.concatenate(states), LineSettings())
+        FollowTask.of(pendulum, states, LineSettings())
+
+
+def test_an_angle_is_observed_by_its_cosine_and_sine() -> None:
+    pendulum, states = swung()
+    assert observes_feature(pendulum)
+    task = FollowTask.of(pendulum, states, LineSettings())
+    away = task.view.shown(pendulum.observe(states)) - pendulum.feature(states)
+    np.testing.assert_allclose(np.sin(away), 0.0, atol=1e-5)
+    assert (np.cos(away) > 0).all()
+    position = task.at(np.arange(len(states)))
+    normal = task.view.normaliser
+    np.testing.assert_allclose(task.inputs(position)[:, :3], (position.observations - normal.origin) / normal.scale)
 
 
 def test_a_plan_through_a_terminal_state_is_refused(plan: Trajectory) -> None:
