@@ -32,6 +32,9 @@ class FollowSettings(PlannedSettings):
     Attributes:
         line: The plan as a line, and how policies see it.
         gate: When a policy passes.
+        stress: A new policy is tested with this many times the random actions of `test_epsilon`, and passes at as many
+            times the failure rates of `gate` (ours). Failures follow random actions: with more of them there are more, at
+            least in proportion, and fewer executions show what a policy is worth. 1 for no stress.
         progress_reward: For the progress of a step (ours: with 1, the actor saturates and fewer mazes are solved).
         effort_cost: For the largest action (ours: without it, actions saturate; with 0.3, mazes take a tenth fewer
             transitions than with 0.1, but where large actions are needed all the time, effort costs what progress is
@@ -53,7 +56,9 @@ class FollowSettings(PlannedSettings):
 
     line: LineSettings = field(default_factory=LineSettings)
     gate: SequentialTest = field(default_factory=SequentialTest)
+    stress: float = 3.0
     progress_reward: float = 0.3
+    stray_cost: float = 0.0
     effort_cost: float = 0.1
     action_noise: float = 0.3
     start_fraction: float = 0.1
@@ -68,7 +73,8 @@ class FollowSettings(PlannedSettings):
         self._check_positive("progress_reward")
         self._check("at least 0", lambda value: value >= 0, "effort_cost", "action_noise", "test_share")
         self._check_fractions("start_fraction", "retry_fraction", "averaging")
-        self._check("at least 1", lambda value: value >= 1, "longest_horizon")
+        self._check("at least 1", lambda value: value >= 1, "longest_horizon", "stress")
+        self.gate.with_failures(self.stress)
         self._check_counts("session_lengths", "attempts")
 
     def agent_spaces(self, model: ResettableModel) -> AgentSpaces:
@@ -215,7 +221,7 @@ class Follow:
         progress = after.position.progress
         reached = after.success | (progress.pointers >= self.state.end)
         terminals = reached | after.terminated | (progress.stalled >= self.settings.line.patience)
-        rewards = (self.settings.progress_reward * after.gains - self.settings.effort_cost * (actions ** 2).mean(axis=1)
+        rewards = (self.settings.progress_reward * (after.gains - self.settings.stray_cost * after.strayed) - self.settings.effort_cost * (actions ** 2).mean(axis=1)
                    + trainer.settings.success_reward * reached)
         trainer.agent.add_transitions(inputs[None], actions[None], rewards[None], task.inputs(after.position)[None],
                                       terminals[None])
@@ -260,7 +266,8 @@ class Follow:
     def _test(self) -> None:
         """Test the policy from the start; keep it if it passes, or if it is the best so far."""
         state, policy, before = self.state, self._average, self.trainer.counter.count
-        found = self._try(policy, 0)
+        stress = self.settings.stress if not state.rounds else 1.0
+        found = self._try(policy, 0, stress)
         if found.passed:
             self.members.insert(0, Member(0, policy))
             state.passed = True
@@ -271,7 +278,7 @@ class Follow:
             self.best, state.best_rate, state.best_blocked = policy, found.rate, found.blocked
         state.phase = "train"
         if state.tests >= self.settings.attempts:
-            state.phase, state.candidate = "split", self._beyond(state.best_blocked)
+            state.phase, state.candidate = "split", 0 if stress > 1.0 else self._beyond(state.best_blocked)
 
     def _split(self) -> None:
         """Try the best policy from the candidate on; keep it from there, or move on to beyond its failures."""
@@ -283,7 +290,9 @@ class Follow:
         found = self._try(self.best, state.candidate)
         if found.passed:
             self.members.insert(0, Member(state.candidate, self.best))
-            self._begin_again(state.candidate)
+            state.passed = state.candidate == 0
+            if not state.passed:
+                self._begin_again(state.candidate)
         else:
             state.candidate = max(self._beyond(found.blocked), state.candidate + 1)
 
@@ -301,35 +310,40 @@ class Follow:
         """Return the pointer one window after another."""
         return pointer + self._window
 
-    def _try(self, policy: Policy, first: int) -> Verdict:
+    def _try(self, policy: Policy, first: int, stress: float = 1.0) -> Verdict:
         """Test a policy, and the finished ones after it, from a pointer on."""
-        found = self._verdict(policy, first)
+        found = self._verdict(policy, first, stress)
         self.trainer.latest |= {"start": self.task.place(first), "success_rate": max(0.0, found.rate)}
         return found
 
-    def _verdict(self, policy: Policy, first: int) -> Verdict:
-        """Execute it once without noise, then from where the last one failed, then from the pointer on with noise."""
+    def _verdict(self, policy: Policy, first: int, stress: float) -> Verdict:
+        """Execute it once without noise, then from where the last one failed, then from the pointer on with noise.
+
+        Under stress the first failures come so soon that those of the last policy are not tried before.
+        """
         relay = Relay([policy, *(member.policy for member in self.members)],
                       [0, *(member.first for member in self.members)])
         start, goal = self.task.at(np.array([self.task.place(first)])), np.array([self.task.line.last + 1])
         ends = self._failures(relay, start, goal, 0.0).ends
         if len(ends):
             return Verdict(False, 0.0, int(ends[0]))
-        if first == 0 and self._trouble is not None:
-            past, _ = self._executed(relay, self._trouble.before, self._trouble.ends + 2 * self._window)
+        if first == 0 and self._trouble is not None and stress == 1.0:
+            past, _ = self._executed(relay, self._trouble.before, self._trouble.ends + 2 * self._window, stress)
             if not past.passed:
                 return past._replace(rate=-1.0)
-        verdict, trouble = self._executed(relay, start, goal)
+        verdict, trouble = self._executed(relay, start, goal, stress)
         if first == 0 and not verdict.passed:
             self._trouble = trouble
         return verdict
 
-    def _executed(self, relay: Relay, starts: Position, until: IndexArray) -> tuple[Verdict, Trouble]:
+    def _executed(self, relay: Relay, starts: Position, until: IndexArray, stress: float) -> tuple[Verdict, Trouble]:
         """Return the verdict on noisy executions from starts [N] to pointers [N], in turn, and where they failed."""
-        def failures(chosen: IndexArray) -> Trouble:
-            return self._failures(relay, starts[chosen], until[chosen], self.trainer.settings.test_epsilon)
+        epsilon = min(1.0, stress * self.trainer.settings.test_epsilon)
 
-        return judged(self.settings.gate, len(until), failures)
+        def failures(chosen: IndexArray) -> Trouble:
+            return self._failures(relay, starts[chosen], until[chosen], epsilon)
+
+        return judged(self.settings.gate.with_failures(stress), len(until), failures)
 
     def _failures(self, relay: Relay, starts: Position, until: IndexArray, epsilon: float) -> Trouble:
         """Return where executions from some starts [N] fail; training begins there from now on."""

@@ -81,12 +81,14 @@ class FollowStep:
     Attributes:
         position: Where they are now.
         gains: Progress along the line, in steps [B].
+        strayed: How much further from the line they are than before, in steps [B].
         success: Which reached the environment's goal [B].
         terminated, ended: Which episodes the environment terminated, and which it ended for whatever reason [B].
     """
 
     position: Position
     gains: Array
+    strayed: Array
     success: BoolArray
     terminated: BoolArray
     ended: BoolArray
@@ -178,8 +180,15 @@ class FollowTask:
         observations = self.model.observe(outcome.states)
         progress = position.progress.advanced(self.line, self.view.features(observations), self.view.window)
         gains = ((progress.pointers - position.progress.pointers) * self.line.spacing).astype(np.float64)
-        return FollowStep(Position(outcome.states, observations, progress), gains, outcome.success,
-                          outcome.terminated, outcome.ended)
+        after = Position(outcome.states, observations, progress)
+        return FollowStep(after, gains, self._away(after) - self._away(position), outcome.success, outcome.terminated,
+                          outcome.ended)
+
+    def _away(self, position: Position) -> Array:
+        """Return how far executions are from their places on the line, in steps [B]."""
+        features = self.view.features(position.observations)
+        lengths: Array = np.linalg.norm(self.line.ahead(features, position.progress.pointers, np.zeros(1))[:, 0], axis=1)
+        return lengths
 
     def execute(self, relay: Relay, position: Position, *, until: IndexArray, epsilon: float, max_steps: int,
                 patience: int, rng: np.random.Generator, counter: Counter) -> Tries:

@@ -132,7 +132,7 @@ def test_after_its_attempts_the_best_policy_is_kept_from_where_it_passes(plan: T
     passes_from = following.task.line.last // 2
     tried: list[int] = []
 
-    def verdict(self: Follow, policy: Any, first: int) -> Verdict:
+    def verdict(self: Follow, policy: Any, first: int, stress: float = 1.0) -> Verdict:
         tried.append(first)
         return Verdict(first >= passes_from, 0.5, first + 10)
 
@@ -148,7 +148,7 @@ def test_after_its_attempts_the_best_policy_is_kept_from_where_it_passes(plan: T
     restored = method(plan.states)
     restored.restore(following.snapshot())
     assert [member.first for member in restored.members] == [following.state.end]
-    monkeypatch.setattr(Follow, "_try", lambda self, policy, first: Verdict(True, 1.0, 0))
+    monkeypatch.setattr(Follow, "_try", lambda self, policy, first, stress: Verdict(True, 1.0, 0))
     while not following.done:
         following.step()
     chain = following.chain(100)
@@ -159,9 +159,9 @@ def test_after_its_attempts_the_best_policy_is_kept_from_where_it_passes(plan: T
 def test_a_policy_that_passes_nowhere_begins_again(plan: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
     following = method(plan.states, FollowSettings().updated({"attempts": 1, "session_lengths": 1}))
     last = following.task.line.last
-    monkeypatch.setattr(Follow, "_try", lambda self, policy, first: Verdict(False, 0.0, last))
+    monkeypatch.setattr(Follow, "_try", lambda self, policy, first, stress=1.0: Verdict(False, 0.0, last))
     agent = following.trainer.agent
-    for _ in range(3):
+    for _ in range(4):
         following.step()
     assert following.trainer.agent is not agent
     assert (following.members, following.state.end, following.state.tests) == ([], last + 1, 0)
@@ -375,3 +375,29 @@ def test_a_session_takes_its_share_of_the_test_before(plan: Trajectory) -> None:
     shortest = following._session_transitions
     following.state.tested = 10 * shortest
     assert following._session_transitions == 5 * shortest
+
+
+def test_a_new_policy_is_tested_under_stress_and_after_its_attempts_the_best_one_without(
+        plan: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Executions fail where there is more noise than the criterion has."""
+    settings = method_settings("follow").updated({"attempts": 2, "stress": 3.0})
+    following, noise = method(plan.states, settings), list[float]()
+    usual = following.trainer.settings.test_epsilon
+
+    def failures(self: Follow, relay: Relay, starts: Position, until: np.ndarray, epsilon: float) -> Trouble:
+        noise.append(epsilon)
+        lost = np.flatnonzero(np.full(len(until), epsilon > usual))
+        return Trouble(starts[lost], starts.progress.pointers[lost])
+
+    monkeypatch.setattr(Follow, "_failures", failures)
+    monkeypatch.setattr(Follow, "_train_step", lambda self: None)
+    while not following.done:
+        following.step()
+    assert following.state.tests == 2
+    assert following.covered == 1.0
+    assert [member.first for member in following.members] == [0]
+    stressed = [epsilon > usual for epsilon in noise if epsilon > 0]
+    assert max(noise) == pytest.approx(3.0 * usual)
+    assert stressed.index(False) == sum(stressed) >= 2
+    with pytest.raises(InvalidOption, match="refused_rate"):
+        FollowSettings().updated({"stress": 20.0})
