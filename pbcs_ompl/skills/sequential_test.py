@@ -44,9 +44,10 @@ class SequentialTest(Settings):
         self._check_counts("most_trials")
 
     def with_failures(self, factor: float) -> Self:
-        """Return the test of rates whose failures are `factor` times as frequent."""
+        """Return the test of rates whose failures are `factor` times as frequent; it takes as many fewer trials."""
         return replace(self, refused_rate=1.0 - factor * (1.0 - self.refused_rate),
-                       accepted_rate=1.0 - factor * (1.0 - self.accepted_rate))
+                       accepted_rate=1.0 - factor * (1.0 - self.accepted_rate),
+                       most_trials=ceil(self.most_trials / factor))
 
     def verdict(self, successes: int, trials: int) -> bool | None:
         """Return whether the rate is accepted; None while more trials are needed.

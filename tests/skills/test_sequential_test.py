@@ -49,7 +49,10 @@ def test_where_failures_are_more_frequent_fewer_trials_tell_the_rates_apart() ->
     assert 1.0 - stressed.refused_rate == pytest.approx(3.0 * 0.06)
     assert 1.0 - stressed.accepted_rate == pytest.approx(3.0 * 0.007)
     assert test.with_failures(1.0).most_needed(0, 0) == test.most_needed(0, 0) == 54
-    assert stressed.most_needed(0, 0) == 17
+    assert (stressed.most_needed(0, 0), stressed.most_trials) == (17, 34)
+    rng = np.random.default_rng(2)
+    assert np.mean([decided(stressed, stressed.refused_rate, rng)[0] for _ in range(1000)]) <= 0.05 + 0.02
+    assert np.mean([decided(stressed, stressed.accepted_rate, rng)[0] for _ in range(1000)]) >= 0.95 - 0.02
     with pytest.raises(InvalidOption, match="refused_rate"):
         test.with_failures(20.0)
 

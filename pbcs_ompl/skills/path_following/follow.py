@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from math import exp
 from typing import NamedTuple
 
 import numpy as np
@@ -26,8 +27,8 @@ SHORTEST_SESSION = 250
 class FollowSettings(PlannedSettings):
     """Settings of the method "follow"; those of the groups `starts` and `plan`, but `improve`, have no meaning for it.
 
-    A step is worth progress_reward * (its progress, in steps) - effort_cost * (mean square of the action, in [-1, 1]),
-    and `episodes.success_reward` more where it reaches the end.
+    A step is worth progress_reward * (its progress - stray_cost * how much further from the line it led, in steps)
+    - effort_cost * (mean square of the action, in [-1, 1]), and `episodes.success_reward` more where it reaches the end.
 
     Attributes:
         line: The plan as a line, and how policies see it.
@@ -36,6 +37,8 @@ class FollowSettings(PlannedSettings):
             times the failure rates of `gate` (ours). Failures follow random actions: with more of them there are more, at
             least in proportion, and fewer executions show what a policy is worth. 1 for no stress.
         progress_reward: For the progress of a step (ours: with 1, the actor saturates and fewer mazes are solved).
+        stray_cost: For the distance to the line (ours; with 0, policies move along the line beside it: a quadrotor at the
+            speed of its plan in another place. With 1, policies pass after half as many sessions in mazes as with 0).
         effort_cost: For the largest action (ours: without it, actions saturate; with 0.3, mazes take a tenth fewer
             transitions than with 0.1, but where large actions are needed all the time, effort costs what progress is
             worth).
@@ -46,10 +49,11 @@ class FollowSettings(PlannedSettings):
             without noise costs about a tenth).
         test_share: Transitions of a session, at least, for each of the test before it (ours: a test that refuses a
             good policy is dear).
-        averaging: Fraction of the averaged policy that stays after an update of the agent; it is the average that is
-            tested and kept (ours: that of the agent's target networks; with 0, the last policy, tests fail more often).
-        attempts: Tests that a policy may fail before the line is split (ours; 6 and 10 were equal in mazes). Each time
-            that training begins again, its sessions are twice as long.
+        averaging: Part of a session over which policies are averaged: after an update of the agent, one part in the
+            updates that are due in it is new. It is the average that is tested and kept (ours: in short sessions that of
+            the agent's target networks; with 0, the last policy, tests fail more often).
+        attempts: Tests that a policy may fail before training begins again or the line is split (ours; 6 and 10 were
+            equal in mazes). Each time that training begins again, its sessions are twice as long.
         longest_horizon: Each time that training begins again, the agent's horizon 1 / (1 - discount) is twice as long,
             up to this many times that of its settings (ours: with a short one, it does not learn to fly).
     """
@@ -58,20 +62,20 @@ class FollowSettings(PlannedSettings):
     gate: SequentialTest = field(default_factory=SequentialTest)
     stress: float = 3.0
     progress_reward: float = 0.3
-    stray_cost: float = 0.0
+    stray_cost: float = 1.0
     effort_cost: float = 0.1
     action_noise: float = 0.3
     start_fraction: float = 0.1
     retry_fraction: float = 0.3
     session_lengths: int = 10
     test_share: float = 0.5
-    averaging: float = 0.995
+    averaging: float = 0.2
     attempts: int = 6
     longest_horizon: float = 4.0
 
     def _check_ranges(self) -> None:
         self._check_positive("progress_reward")
-        self._check("at least 0", lambda value: value >= 0, "effort_cost", "action_noise", "test_share")
+        self._check("at least 0", lambda value: value >= 0, "stray_cost", "effort_cost", "action_noise", "test_share")
         self._check_fractions("start_fraction", "retry_fraction", "averaging")
         self._check("at least 1", lambda value: value >= 1, "longest_horizon", "stress")
         self.gate.with_failures(self.stress)
@@ -120,12 +124,14 @@ class Follow:
     """Trains one policy to move along the plan, from states all along it, until it passes a sequential test.
 
     A test executes the policy from the start once without noise and, if that succeeds, with random actions until the
-    sequential test has an answer. Where the last such test found failures, executions begin shortly before them and end
-    shortly after them first: a policy that still fails there is refused for a fraction of the steps.
+    sequential test has an answer: under stress until training has begun again, later without. Where the last test
+    without stress found failures, executions begin shortly before them and end shortly after them first: a policy that
+    still fails there is refused for a fraction of the steps.
 
-    After `attempts` failed tests the line is split: the best policy is tried from where its failures ended. From the
-    first place where it passes it is kept to the end, and a new policy is trained up to there. Where it passes nowhere,
-    training begins again with new networks, longer sessions and a longer horizon.
+    After `attempts` failed tests the best policy is tested without stress. Where it fails, training begins again with
+    new networks, longer sessions and a longer horizon. From then on the line is split first: the best policy is tried
+    from where its failures ended. From the first place where it passes it is kept to the end, and a new policy is
+    trained up to there.
 
     Source: ours. Starts all along a demonstration are those of DeepMimic (Peng et al. 2018, "reference state
     initialization"); the split is the idea of [Matheron2020] chapter 7.
@@ -221,7 +227,8 @@ class Follow:
         progress = after.position.progress
         reached = after.success | (progress.pointers >= self.state.end)
         terminals = reached | after.terminated | (progress.stalled >= self.settings.line.patience)
-        rewards = (self.settings.progress_reward * (after.gains - self.settings.stray_cost * after.strayed) - self.settings.effort_cost * (actions ** 2).mean(axis=1)
+        gains = after.gains - self.settings.stray_cost * after.strayed
+        rewards = (self.settings.progress_reward * gains - self.settings.effort_cost * (actions ** 2).mean(axis=1)
                    + trainer.settings.success_reward * reached)
         trainer.agent.add_transitions(inputs[None], actions[None], rewards[None], task.inputs(after.position)[None],
                                       terminals[None])
@@ -233,8 +240,12 @@ class Follow:
             self._steps[over] = 0
         before = trainer.updates
         trainer.train(len(actions))
-        self._average = self._average.blended(self._present(),
-                                              1.0 - self.settings.averaging ** (trainer.updates - before))
+        self._average = self._average.blended(self._present(), self._renewed(trainer.updates - before))
+
+    def _renewed(self, updates: int) -> float:
+        """Return the part of the averaged policy that some updates replace by the present one."""
+        memory = self.settings.averaging * self._session_transitions * self.trainer.settings.updates_per_transition
+        return 1.0 - exp(-updates / memory) if memory > 0.0 else 1.0
 
     def _explore(self, inputs: Array) -> Array:
         """Return actions [B, A] in [-1, 1]: the agent's with noise, a few of them random."""
@@ -281,9 +292,13 @@ class Follow:
             state.phase, state.candidate = "split", 0 if stress > 1.0 else self._beyond(state.best_blocked)
 
     def _split(self) -> None:
-        """Try the best policy from the candidate on; keep it from there, or move on to beyond its failures."""
+        """Try the best policy from the candidate on; keep it from there, or move on to beyond its failures.
+
+        Before training has begun again it is tried from the start only: sessions may just have been too short.
+        """
         state = self.state
-        if self.best is None or state.candidate >= min(state.end, int(self.task.pointers[-1])):
+        far = 0 if not state.rounds else min(state.end, int(self.task.pointers[-1])) - 1
+        if self.best is None or state.candidate > far:
             self.members = []
             self._begin_again(self.task.line.last + 1)
             return

@@ -129,6 +129,7 @@ def test_the_budget_binds_and_a_larger_one_continues(tmp_path: Path) -> None:
 def test_after_its_attempts_the_best_policy_is_kept_from_where_it_passes(plan: Trajectory,
                                                                          monkeypatch: pytest.MonkeyPatch) -> None:
     following = method(plan.states, FollowSettings().updated({"attempts": 2, "session_lengths": 1}))
+    following.state.rounds = 1
     passes_from = following.task.line.last // 2
     tried: list[int] = []
 
