@@ -280,7 +280,7 @@ def _leading(graph: Graph, data: ControllerData, seen: str, far: str, before: st
 
 
 def _heading(graph: Graph, speeds: int, seen: str) -> tuple[str, str]:
-    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.FreeJoint` and `deploy.Fixed`."""
+    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.FreeJoint`."""
     if not speeds:
         zero = graph("Mul", graph.columns(seen, [0]), 0.0)
         return graph("Add", zero, 1.0), zero

@@ -186,8 +186,8 @@ class FollowTask:
 
     def _away(self, position: Position) -> Array:
         """Return how far executions are from their places on the line, in steps [B]."""
-        features = self.view.features(position.observations)
-        lengths: Array = np.linalg.norm(self.line.ahead(features, position.progress.pointers, np.zeros(1))[:, 0], axis=1)
+        features, here = self.view.features(position.observations), np.zeros(1)
+        lengths: Array = np.linalg.norm(self.line.ahead(features, position.progress.pointers, here)[:, 0], axis=1)
         return lengths
 
     def execute(self, relay: Relay, position: Position, *, until: IndexArray, epsilon: float, max_steps: int,

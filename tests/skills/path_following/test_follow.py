@@ -18,8 +18,9 @@ from pbcs_ompl.skills import load_chain, method_settings
 from pbcs_ompl.skills.agent_interface import load_agent
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
-from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings
+from pbcs_ompl.skills.path_following.follow import Follow
 from pbcs_ompl.skills.path_following.follower import Progress, Relay
+from pbcs_ompl.skills.path_following.settings import FollowSettings
 from pbcs_ompl.skills.path_following.shown_feature import observes_feature
 from pbcs_ompl.skills.path_following.task import FollowTask, LineSettings, Position, around_last_progress, extended
 from pbcs_ompl.skills.path_following.verdict import Trouble, Verdict
