@@ -3,16 +3,16 @@
 Differs: losses are means over the mini-batch, not (half) sums; Adam does not see the factor.
 """
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
-import numba
 import numpy as np
 import torch
 from torch import Tensor
 
 from pbcs_ompl.agents import losses
-from pbcs_ompl.agents.kernels.ddpg import Constants, Stack, update_seed, update_seeds
+from pbcs_ompl.agents.kernels.ddpg import Constants, Stack, update_seed
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
 from pbcs_ompl.agents.networks import TrainedNetwork
 from pbcs_ompl.agents.replay import Batch
@@ -61,22 +61,25 @@ class DDPG(StackedAgent):
                               np.float32(1.0 - self.settings.polyak))
         rates = torch.stack((actor_rates, critic_rates), dim=1).numpy()
         actor, critic = _stack(self.actor, len(self.seeds)), _stack(self.critic, len(self.seeds))
-        threads = min(torch.get_num_threads(), numba.get_num_threads(), len(self.seeds))
-        if threads == 1:
-            for seed in range(len(self.seeds)):
-                update_seed(rows.numpy()[:, seed], rates, seed, actor, critic, constants, filled[:, seed])
-        else:
-            _in_threads(threads, rows.numpy(), rates, actor, critic, constants, filled)
+        plain_rows = rows.numpy()
+
+        def update(seed: int) -> None:
+            update_seed(plain_rows[:, seed], rates, seed, actor, critic, constants, filled[:, seed])
+
+        _in_threads(update, range(len(self.seeds)))
         critic_losses, actor_losses = np.moveaxis(filled.astype(np.float64), 2, 0)
         return {"critic_loss": critic_losses, "actor_loss": actor_losses}
 
 
-def _in_threads(threads: int, *arguments: Any) -> None:
-    """Call `update_seeds` on that many threads."""
-    before = numba.get_num_threads()
-    numba.set_num_threads(threads)
-    update_seeds(*arguments)
-    numba.set_num_threads(before)
+def _in_threads(function: Callable[[int], None], numbers: range) -> None:
+    """Call a function that leaves Python's lock for each number, on as many threads as torch may use."""
+    threads = min(torch.get_num_threads(), len(numbers))
+    if threads == 1:
+        for number in numbers:
+            function(number)
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(function, numbers))
 
 
 def _stack(network: TrainedNetwork, seeds: int) -> Stack:

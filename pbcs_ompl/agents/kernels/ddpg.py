@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 
 from pbcs_ompl.agents.kernels import network as nets
 from pbcs_ompl.core.compiled import njit
@@ -44,7 +43,7 @@ class Scratch(NamedTuple):
     targets: np.ndarray
 
 
-@njit()
+@njit(nogil=True)
 def update_seed(rows: np.ndarray, rates: np.ndarray, seed: int, actor: Stack, critic: Stack,
                 constants: Constants, losses: np.ndarray) -> None:
     """Make K updates of one seed.
@@ -147,11 +146,3 @@ def _actor_gradient(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, co
                   batch, scratch.actor_gradient)
     mean: float = loss / batch
     return mean
-
-
-@njit(parallel=True)
-def update_seeds(rows: np.ndarray, rates: np.ndarray, actor: Stack, critic: Stack, constants: Constants,
-                 losses: np.ndarray) -> None:
-    """Make K updates of S seeds in parallel; `rows` [K, S, B, W] and `losses` [K, S, 2] are those of all seeds."""
-    for seed in prange(rows.shape[1]):
-        update_seed(rows[:, seed], rates, seed, actor, critic, constants, losses[:, seed])

@@ -8,9 +8,9 @@ from matplotlib.patches import Circle
 from scipy.stats import binomtest
 
 from pbcs_ompl.experiments.claims import (
+    APART,
     FEWEST_PAIRS,
     SIGNIFICANCE,
-    WORTH,
     Claim,
     at_least,
     fewest_runs,
@@ -122,7 +122,7 @@ def _compared(records: Records) -> list[Claim]:
         chance = binomtest(ours, ours + theirs, alternative="greater").pvalue if ours + theirs else 1.0
         claims.append(Claim(f"within the same million transitions PBCS solves more mazes than {label} "
                             f"(p < {SIGNIFICANCE})",
-                            True if chance < SIGNIFICANCE else False if len(pairs) >= fewest_runs(WORTH) else None,
+                            True if chance < SIGNIFICANCE else False if len(pairs) >= fewest_runs(*APART) else None,
                             {"PBCS": rate(sum(one for one, _ in pairs), len(pairs)),
                              label: rate(sum(other for _, other in pairs), len(pairs)),
                              f"only PBCS, only {label}": [ours, theirs], "p (McNemar, exact)": float(chance)},
