@@ -91,8 +91,7 @@ def test_a_changed_follower_is_found_and_one_method_reads_not_the_other(folder: 
 
 
 def test_resuming_gives_the_same_bits(plan: Trajectory) -> None:
-    strict = FollowSettings().updated({"attempts": 2, "session_lengths": 1, "refused_rate": 0.999,
-                                       "accepted_rate": 0.9999})  # no policy passes
+    strict = FollowSettings().updated({"attempts": 2, "session_lengths": 1, "test_epsilon": 0.9})  # no policy passes
     whole, first, second = (method(plan.states, strict) for _ in range(3))
     for _ in range(5):
         whole.step()
