@@ -44,7 +44,7 @@ def test_more_successes_never_turn_an_acceptance_into_a_refusal() -> None:
         assert verdicts[0] < verdicts[-1] or trials == 1
 
 
-def test_where_failures_are_more_frequent_fewer_trials_tell_the_rates_apart() -> None:
+def test_where_failures_are_more_frequent_fewer_trials_suffice() -> None:
     test, stressed = SequentialTest(accepted_rate=0.993), SequentialTest(accepted_rate=0.993).with_failures(3.0)
     assert 1.0 - stressed.refused_rate == pytest.approx(3.0 * 0.06)
     assert 1.0 - stressed.accepted_rate == pytest.approx(3.0 * 0.007)
