@@ -37,7 +37,7 @@ def colour(index: int) -> str:
 
 
 def shade(index: int, count: int) -> tuple[float, ...]:
-    """Return the colour of one of `count` curves that a growing quantity tells apart."""
+    """Return the colour of one of `count` curves that differ in a growing quantity."""
     return tuple(colormaps[QUANTITIES](0.92 * index / max(1, count - 1)))
 
 

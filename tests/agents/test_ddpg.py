@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from pbcs_ompl.agents import DDPG, DDPGSettings, NonFiniteData, update
+from pbcs_ompl.agents import DDPG, DDPGSettings, NonFiniteData
 from pbcs_ompl.agents.networks import TrainedNetwork
 from pbcs_ompl.agents.update import Compile
 
@@ -82,22 +82,6 @@ def test_the_kernel_equals_eager_torch() -> None:
         np.testing.assert_allclose(weights(kernel, index), weights(eager, index), atol=1e-5)
     for name in mine:
         np.testing.assert_allclose(mine[name], theirs[name], rtol=1e-4)
-
-
-def test_the_kernel_does_the_same_on_several_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Other tests have one thread, so what only several threads do would never be run."""
-    monkeypatch.setattr(update, "PARALLEL_WORK", 0)
-    found = []
-    before = torch.get_num_threads()
-    for threads in (1, 3):
-        torch.set_num_threads(threads)
-        try:
-            agent = fill(make(0, 1, 2, 3), 0, 1, 2, 3)
-            agent.train(20)
-        finally:
-            torch.set_num_threads(before)
-        found.append([weights(agent, index) for index in range(4)])
-    np.testing.assert_array_equal(*found)
 
 
 @pytest.mark.slow
