@@ -96,14 +96,14 @@ def _failures(failed: dict[str, str]) -> list[tuple[str, str]]:
 
 def _closing_lines(title: str, summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
     lines = [(summary["id"], f"{title}: {summary['runs']} runs")]
-    lines += [(VERDICTS[claim["agrees"]], _in_one_line(claim)) for claim in summary["agrees"]]
+    lines += [(VERDICTS[claim["agrees"]], in_one_line(claim)) for claim in summary["agrees"]]
     lines += _failures(summary["failed"])
     pictures = sorted(Path(figure).stem for figure in summary["figures"])
     return [*lines, ("figures", f"{out / 'figures'}/ ({', '.join(pictures) or 'none'})"), ("files", list_files(out)),
             ("numbers", str(out / "result.json")), ("next", command(report_words(out)))]
 
 
-def _in_one_line(claim: dict[str, Any]) -> str:
+def in_one_line(claim: dict[str, Any]) -> str:
     """Write a claim, the numbers that say most about it, and what it lacks."""
     numbers = claim["numbers"]
     rates = [f"{value['successes']}/{value['n']}" for value in numbers.values()

@@ -26,6 +26,12 @@ class Report(NamedTuple):
     Attributes:
         page: The file.
         sections: What it shows of each folder.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.plan("pbcs/Maze-v0", seed=0, out="runs/plan")
+        >>> [one["kind"] for one in pbcs_ompl.write_report("runs").summary()["folders"]]
+        ['plan']
     """
 
     page: Path
@@ -53,6 +59,12 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Report:
     Raises:
         RunFolderError: no results in `folder`; or `out` is not a report, or cannot be written.
         DamagedFile: `folder` is a result folder with a damaged file. One among many is reported on the page.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.plan("pbcs/Maze-v0", seed=0, out="runs/plan")
+        >>> pbcs_ompl.write_report("runs").page.name
+        'report.html'
     """
     root = Path(folder)
     paths = find_folders(root)
