@@ -144,7 +144,7 @@ class Tree:
 
     def path_to(self, node: int) -> IndexArray:
         """Return the nodes from a root to `node`, both included."""
-        parents, path, node = memoryview(self.columns.parents), [], int(node)
+        parents, path, node = self.columns.parents.data, [], int(node)
         while node >= 0:
             path.append(node)
             node = parents[node]

@@ -164,7 +164,8 @@ def add(pool: Members, heads: Heads, runs: Runs, totals: NDArray[np.int64], numb
 def grow_and_add(queue: BinQueue, cell: NDArray[np.int64], place: Number, node: Number) -> None:
     """Add a node where `add` could not: open its bin, or double it.
 
-    Inlined: every third node or so comes here, and to hand over the arrays of a queue costs as much as a step of a point.
+    Inlined: every third node or so comes here, and to hand over the arrays of a queue costs as much as a step of a
+    point.
     """
     pool, heads, free, used = queue.pool, queue.heads, queue.free, queue.used
     number: Number = np.int64(queue.table[place]) - 1

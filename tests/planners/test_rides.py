@@ -156,9 +156,9 @@ def test_a_compiled_search_places_its_start_states_itself(solve, square, compile
     """Also those that come between two solves; the kernels of the other way, which take long to compile, stay out."""
     trees = []
     for world in (square, compiled_square):
-        planner, _, counter, setup = solve(lambda si: Rides.build(si, seed=4), world(goal=99.0), 700)
+        planner, _, counter, setup = solve(lambda si: Rides.build(si, seed=4), world(goal=99.0, extent=30.0), 700)
         start = setup.getSpaceInformation().allocState()
-        start[0], start[1] = 2.2, 1.9
+        start[0], start[1] = 22.0, 19.0
         setup.getProblemDefinition().addStartState(start)
         counter.budget = 1500
         planner.solve(ob.PlannerTerminationCondition(lambda: False))

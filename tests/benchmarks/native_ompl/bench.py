@@ -4,12 +4,12 @@
     python tests/benchmarks/native_ompl/bench.py [--sizes 9 15] [--mazes 40] [--first-seed 4000]
 
 All planners have the same walls, steps, start, goal and cells (the bins of Ex and Rides; KPIECE1 and Rides also have
-rows with cells twice as large, which both like). None knows where the goal is, but OMPL's KPIECE1 knows how far it is, unless it is called
-blind. OMPL's are compiled from `planners.cpp` with -O3 -march=native; ours run through `pbcs_ompl`, their loops
-compiled before. Seconds are CPU seconds of the search alone. For each maze the planners run one after the other, so
-that other work on the machine slows all of them. The numbers in brackets are the mazes in which Rides needs less, with
-the p of a two-sided sign test. Below the table stands whether those of ours that repeat one of OMPL's need as many
-transitions.
+rows with cells twice as large, which both like). None knows where the goal is, but OMPL's KPIECE1 knows how far it is,
+unless it is called blind. OMPL's are compiled from `planners.cpp` with -O3 -march=native; ours run through
+`pbcs_ompl`, their loops compiled before. Seconds are CPU seconds of the search alone. For each maze the planners run
+one after the other, so that other work on the machine slows all of them. The numbers in brackets are the mazes in which
+Rides needs less, with the p of a two-sided sign test. Below the table stand the same numbers for Rides and KPIECE1 in
+the larger cells, and whether those of ours that repeat one of OMPL's need as many transitions.
 """
 
 import argparse
