@@ -226,7 +226,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
     for child in range(known, end):
         if totals[REGIONS] + len(order) > len(rows):
             return child - first, False
-        success = False
+        terminal, success = ends[child], False
         if child >= first:
             if rides[0, ACTIVE] == 0:
                 _begin(rows, order, runs, tails, totals, pool, yields, bounds, rides, actions, 0, rng)
@@ -240,7 +240,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
             if not finite(states, child):
                 return child + 1 - first, False
         number, opened = NO_BIN, False
-        if not ends[child]:
+        if not terminal:
             cell_of(features, child, bin_size, turns, cell)
             cell[len(bin_size)] = 0
             number = np.int64(places[find_cell(cells, places, cell)]) - 1
@@ -248,7 +248,7 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
                 number, opened = open_bin(regions, cell), True
             add_node(rows, pool, free, used, number, child)
         if child >= first:
-            _note(rides, 0, yields, states, child, number, opened, ends[child], limits)
+            _note(rides, 0, yields, states, child, number, opened, terminal, limits)
         if success:
             return child + 1 - first, True
     return end - first, False
