@@ -46,6 +46,7 @@ class CarParkEnv(BodyEnv):
     """
 
     feature_dims = (0, 1, 2)
+    feature_periods = (0.0, 0.0, 2.0 * np.pi)
     kernel = car_kernels.compiled_step
 
     def __init__(self, *, obstacles: Sequence[Sequence[float]] = OBSTACLES, start: Sequence[float] = START,

@@ -16,7 +16,7 @@ A of an action, I of what a network sees, F of a place on a line.
 import json
 import math
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,12 +69,6 @@ Step = tuple[Array, Indices, Indices | None]
 """What networks see [B, I], which of them acts [B], and the side of a robot that leads [B]."""
 
 
-class _Kind(Protocol):
-    def __init__(self, words: Words, arrays: Arrays): ...
-
-    def step(self, observations: Array, memory: Memory) -> Step: ...
-
-
 class Controller:
     """Drives one episode, or several side by side, by observations alone.
 
@@ -88,9 +82,9 @@ class Controller:
     """
 
     def __init__(self, words: Words, arrays: Arrays):
-        kinds: dict[str, type[_Kind]] = {"chain": _Chain, "follower": _Follower, "robot follower": _RobotFollower}
+        kinds: dict[str, Any] = {"chain": _Chain, "follower": _Follower, "robot follower": _RobotFollower}
         self.words = words
-        self._kind = kinds[words["kind"]](words, arrays)
+        self._kind: _Chain | _Follower = kinds[words["kind"]](words, arrays)
         self._networks = _Networks(arrays, words["networks"])
         self._actions = _Actions(arrays, words["action"]["shape"])
         self.reset()
@@ -124,11 +118,10 @@ class Controller:
             ValueError: the observation has another size, or there are more or fewer than episodes.
         """
         observations = _rows(observation, self._single)
-        count = len(next(iter(self.memory.values())))
-        expected = (count, len(self.words["observation"]))
+        expected = (len(next(iter(self.memory.values()))), len(self.words["observation"]))
         if observations.shape != expected:
-            names = ", ".join(self.words["observation"])
-            raise ValueError(f"observations of the shape {observations.shape}; expected {expected}: {names}")
+            raise ValueError(f"observations of the shape {observations.shape}; expected {expected}: "
+                             f"{', '.join(self.words['observation'])}")
         inputs, chosen, side = self._kind.step(observations, self.memory)
         controls = self._networks.act(inputs, chosen)
         if side is not None and isinstance(self._kind, _RobotFollower):
@@ -250,35 +243,50 @@ class _Follower:
         self._distances, self._firsts, self._entries = arrays["distances"], arrays["firsts"], arrays["entries"]
         self._unit, self._origin, self._scale = arrays["unit"], arrays["origin"], arrays["scale"]
         self._patience, self._reach = words["patience"], np.arange(words["reach"] + 1)
-        self._pass_radius = arrays.get("pass_radius", np.inf)  # of older files
+        self._pass_radius, self._periods = arrays.get("pass_radius", np.inf), arrays.get("periods")
+        sines = arrays.get("sines", np.full(len(self._unit), -1))
+        self._angles, self._sines = np.flatnonzero(sines >= 0), sines[sines >= 0]
+        self._own = np.where(sines >= 0, 0.0, self._unit)
 
     def step(self, observations: Array, memory: Memory) -> Step:
         """Return what networks see [B, I], which one acts [B], and no side."""
-        places = observations[:, self._entries] / self._unit
-        self._advance(places, memory)
-        ahead = self._ahead(places, memory["pointer"])
+        places = observations[:, self._entries]
+        if len(self._angles):
+            places[:, self._angles] = np.arctan2(observations[:, self._sines], places[:, self._angles])
+        places /= self._unit
+        near = self._advance(places, memory)
+        if self._periods is not None:
+            observations = observations.copy()
+            observations[:, self._entries] += (near - places) * self._own
+        ahead = self._ahead(near, memory["pointer"])
         inputs = np.concatenate([(observations - self._origin) / self._scale, ahead.reshape(len(ahead), -1),
-                                 self._stalled(memory)], axis=1)
+                                 np.minimum(memory["stalled"][:, None] / self._patience, 1.0)], axis=1)
         return inputs, np.searchsorted(self._firsts, memory["pointer"], side="right") - 1, None
 
-    def _advance(self, places: Array, memory: Memory) -> None:
-        """Move the pointers to the nearest points of those ahead, and count the steps since they moved last."""
+    def _near(self, places: Array, pointer: Indices) -> Array:
+        """Return places [B, F] moved by whole periods to where they are nearest to the points of the pointers."""
+        if self._periods is None:
+            return places
+        turns = np.rint((places - self.line[pointer]) / np.where(self._periods > 0.0, self._periods, np.inf))
+        return np.asarray(places - self._periods * turns)
+
+    def _advance(self, places: Array, memory: Memory) -> Array:
+        """Move the pointers to the nearest points ahead, count the steps since they moved last; return `_near` them."""
         pointer, stalled = memory["pointer"], memory["stalled"]
+        near = self._near(places, pointer)
         candidates = np.minimum(pointer[:, None] + self._reach, len(self.line) - 1)
-        squares = np.add.reduce((self.line[candidates] - places[:, None]) ** 2, axis=2)
+        squares = np.add.reduce((self.line[candidates] - near[:, None]) ** 2, axis=2)
         barred = (squares[:, 1:] > squares[:, :-1]) & (squares[:, 1:] > self._pass_radius ** 2)
         squares[:, 1:][np.logical_or.accumulate(barred, axis=1)] = np.inf
         moved = candidates[np.arange(len(places)), squares.argmin(axis=1)]
         stalled[:] = np.where(moved > pointer, 0, stalled + 1)
         pointer[:] = moved
+        return self._near(places, pointer)
 
     def _ahead(self, places: Array, pointer: Indices) -> Array:
         """Return the points of the line at the distances ahead, relative to where the episodes are [B, K, F]."""
         shown = np.minimum(pointer[:, None] + self._distances, len(self.line) - 1)
         return np.asarray(self.line[shown] - places[:, None])
-
-    def _stalled(self, memory: Memory) -> Array:
-        return np.asarray(np.minimum(memory["stalled"][:, None] / self._patience, 1.0))
 
 
 class _RobotFollower(_Follower):
@@ -289,7 +297,7 @@ class _RobotFollower(_Follower):
         sides, self._actions = arrays["side_observations"], arrays["side_actions"]
         self._shape = sides.shape[:2]
         self._all_sides = np.concatenate(list(sides)).T.copy()
-        self._frame = FreeJoint(words["speeds"]) if words["speeds"] else Fixed()
+        self._frame = FreeJoint(words["speeds"])
         self._half = arrays["half"]
         self._body = np.delete(np.arange(self._shape[1]), self._entries)
 
@@ -310,7 +318,7 @@ class _RobotFollower(_Follower):
         seen, turn = all_seen[rows, side], headings[rows, side].conj()
         own = (_complex(self._ahead(places, pointer)) * turn[:, None]).view(np.float64)
         body = (self._frame.turned(seen, turn)[:, self._body] - self._origin) / self._scale
-        inputs = np.concatenate([body, own, self._stalled(memory)], axis=1)
+        inputs = np.concatenate([body, own, np.minimum(memory["stalled"][:, None] / self._patience, 1.0)], axis=1)
         return np.minimum(np.maximum(inputs, -LARGEST), LARGEST), np.zeros(len(rows), np.int64), side
 
     def turned_back(self, controls: Array, side: Indices) -> Array:
@@ -334,18 +342,6 @@ class _RobotFollower(_Follower):
         return before if kept.all() else np.where(kept, before, along.argmax(axis=1))
 
 
-class Fixed:
-    """The frame of a robot that has no heading."""
-
-    def heading(self, seen: Array) -> Complex:
-        """Return the directions [...] in which robots look: that of the x axis."""
-        return np.ones(seen.shape[:-1], np.complex128)
-
-    def turned(self, seen: Array, turn: Complex) -> Array:
-        """Return what robots observe of themselves [B, O] in a turned world: the same."""
-        return seen
-
-
 class FreeJoint:
     """The frame of a robot whose observation begins with place and quaternion (w, x, y, z) of a free joint.
 
@@ -353,19 +349,23 @@ class FreeJoint:
     points along the x axis of the joint, and a turn of the world by a multiplies both by exp(ia/2).
 
     Args:
-        speeds: The entry where its speed begins.
+        speeds: The entry where its speed begins; 0 for a robot that has no heading.
     """
 
     def __init__(self, speeds: int):
-        self._speeds = slice(speeds, speeds + 2)
+        self._heads, self._speeds = speeds > 0, slice(speeds, speeds + 2)
 
     def heading(self, seen: Array) -> Complex:
         """Return the directions [...] in which the x axis of the joint points in observations [..., O]."""
+        if not self._heads:
+            return np.ones(seen.shape[:-1], np.complex128)
         squares = np.square(_complex(seen.take(QUATERNION, axis=-1)))
         return _unit(squares[..., 0] + squares[..., 1])
 
     def turned(self, seen: Array, turn: Complex) -> Array:
         """Return observations [B, O] in a world that is turned [B]; the place is left out."""
+        if not self._heads:
+            return seen
         turned = seen.copy()
         turned[:, self._speeds] = (_complex(seen[:, self._speeds].copy()) * turn)[:, None].view(np.float64)
         quaternion = _complex(seen.take(QUATERNION, axis=1)) * np.sqrt(turn)[:, None]

@@ -16,17 +16,21 @@ if TYPE_CHECKING:
     from pbcs_ompl.planners.planner import Strategy, TreePlanner
     from pbcs_ompl.planners.random_walk import RandomWalk
     from pbcs_ompl.planners.rides import Rides
+    from pbcs_ompl.planners.rides_sst import RidesSST
     from pbcs_ompl.planners.rrt_compiled import RRTCompiled
     from pbcs_ompl.planners.rrt_nh import RRTNH
     from pbcs_ompl.planners.rrt_steered import RRTSteered
+    from pbcs_ompl.planners.sst_compiled import SSTCompiled
 
 __all__ = ["RRTNH", "ESTAdapted", "ESTCompiled", "Ex", "KPIECE1Compiled", "PlanningContext", "RRTCompiled",
-           "RRTSteered", "RandomWalk", "Rides", "Strategy", "Tree", "TreePlanner"]
+           "RRTSteered", "RandomWalk", "Rides", "RidesSST", "SSTCompiled", "Strategy", "Tree", "TreePlanner"]
 
 _MODULES = {"ESTAdapted": "planners.est_adapted", "ESTCompiled": "planners.est_compiled",
             "KPIECE1Compiled": "planners.kpiece_compiled", "RRTCompiled": "planners.rrt_compiled",
+            "SSTCompiled": "planners.sst_compiled",
             "Ex": "planners.ex", "PlanningContext": "planners.context",
-            "RandomWalk": "planners.random_walk", "Rides": "planners.rides", "RRTNH": "planners.rrt_nh",
+            "RandomWalk": "planners.random_walk", "Rides": "planners.rides", "RidesSST": "planners.rides_sst",
+            "RRTNH": "planners.rrt_nh",
             "RRTSteered": "planners.rrt_steered",
             "Strategy": "planners.planner", "Tree": "core.tree", "TreePlanner": "planners.planner"}
 

@@ -4,6 +4,7 @@ Each of the two classes knows the other: `Strategy.build` makes a TreePlanner, w
 """
 
 import inspect
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
@@ -18,7 +19,7 @@ from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.options import check_control_duration, check_names, check_positive_integer
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.tree import Tree
-from pbcs_ompl.core.types import Array, Counter, IndexArray
+from pbcs_ompl.core.types import Array, Counter, IndexArray, Solution
 from pbcs_ompl.planners.compiled import CompiledStep, CompiledStrategy
 from pbcs_ompl.planners.context import PlanningContext
 from pbcs_ompl.planners.ompl_propagator import OmplPropagator
@@ -39,10 +40,12 @@ class Strategy(ABC):
     Attributes:
         context: The problem, from `start` on.
         rng: The random numbers of the run, from `start` on; use no others.
+        continues: Whether the search continues after its first solution, for shorter ones, until its budget ends.
     """
 
     context: PlanningContext
     rng: np.random.Generator
+    continues = False
 
     def start(self, context: PlanningContext, rng: np.random.Generator) -> None:
         """Begin a new tree, which is still empty. Overriding methods call this one first."""
@@ -72,6 +75,9 @@ class Strategy(ABC):
     def inserted(self, tree: Tree, first: int, last: int) -> None:  # noqa: B027 - optional
         """Note the new nodes first, ..., last - 1: all of them roots, or none; some may be terminal."""
 
+    def reached(self, tree: Tree, node: int) -> None:  # noqa: B027 - optional
+        """Note that a new node is in the goal, before `inserted` is called with it; where the search continues."""
+
     def resolved(self) -> dict[str, Any]:
         """Return the options whose values `start` took from the problem; none unless overridden."""
         return {}
@@ -98,7 +104,8 @@ class Strategy(ABC):
         """
         check_names(f"planner {cls.__name__!r}", "option", options, cls.options())
         given = {**cls.options(), **options}
-        of_planner = {name: options.pop(name) for name in PLANNER_OPTIONS if name in options}
+        of_planner = {name: given[name] for name in PLANNER_OPTIONS if name in given}
+        options = {name: value for name, value in options.items() if name not in PLANNER_OPTIONS}
         try:
             strategy = cls(**options)
         except (TypeError, ValueError) as error:
@@ -107,7 +114,7 @@ class Strategy(ABC):
 
 
 class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no types
-    """Selects nodes, propagates them, keeps what follows, until a node is in the goal.
+    """Selects nodes, propagates them, keeps what follows, until a node is in the goal; a strategy may continue then.
 
     It works on any `ompl.control.SpaceInformation`. After `use_model` it propagates through the environment itself,
     many nodes at a time. Only exact solutions are reported. Exceptions never cross OMPL: `solve` keeps the first in
@@ -146,6 +153,7 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
         self._propagator: BatchPropagator | None = None
         self._tree: Tree | None = None
         self._solution: IndexArray | None = None
+        self._solutions: list[Solution] = []
         self._problem: Any = None
         self._error: PbcsError | None = None
 
@@ -170,8 +178,13 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
 
     @property
     def solution(self) -> IndexArray | None:
-        """The nodes [T+1] of the path of the last `solve`, one a step; None unless it reached the goal."""
+        """The nodes [T+1] of the shortest path of the last `solve`, one a step; None unless it reached the goal."""
         return self._solution
+
+    @property
+    def solutions(self) -> list[Solution]:
+        """When the last `solve` found a path shorter than all before, and its steps."""
+        return list(self._solutions)
 
     @property
     def strategy(self) -> Strategy:
@@ -191,17 +204,25 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
     def use_model(self, model: ResettableModel, counter: Counter) -> None:
         """Propagate through `model` from now on, and count every transition in `counter`; drops the tree."""
         self._propagator = ModelPropagator(self.getSpaceInformation(), model, counter, self._durations)
-        self._tree = None
+        self._tree = self._solution = None
+        self._solutions = []
 
     def clear(self) -> None:
         """Drop the tree."""
         super().clear()
         self._tree = self._solution = self._problem = None
+        self._solutions = []
         self._error = None
 
     def solve(self, ptc: Any) -> Any:
-        """Grow the tree until the goal, the budget's end, or `ptc` (a condition, a callable or seconds)."""
-        self._error = self._solution = None
+        """Grow the tree until the goal, the budget's end, or `ptc` (a condition, a callable or seconds).
+
+        Where the strategy continues, the goal ends nothing, and the shortest path is the solution, be it of a `solve`
+        before.
+        """
+        self._error = None
+        if not self._strategy.continues:
+            self._solution, self._solutions = None, []
         try:
             return ob.PlannerStatus(self._solve(_condition(ptc)))
         except PbcsError as error:
@@ -233,18 +254,29 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
             self._propagator = OmplPropagator(self.getSpaceInformation(), durations)
         propagator, goal = self._propagator, problem.getGoal()
         if problem is not self._problem:  # the same C++ object is the same in Python while it is held here
-            self._problem, self._tree = problem, None
-        reached = self._add_starts(propagator, goal)
+            self._problem, self._tree, self._solution, self._solutions = problem, None, None, []
+        began, reached = time.perf_counter(), self._add_starts(propagator, goal)
         tree = self._tree
         if tree is None:
             return ob.PlannerStatus.INVALID_START
-        while reached < 0:
+        while True:
+            if reached >= 0:
+                self._keep_path(tree.path_to(reached), time.perf_counter() - began, propagator.counter.count)
+            if self._solution is not None and (len(self._solution) <= 2 or not self._strategy.continues):
+                break
             if propagator.counter.left == 0 or stop():
-                return ob.PlannerStatus.TIMEOUT
+                break
             reached = self._advance(propagator, tree, goal)
-        self._solution = tree.path_to(reached)
+        if self._solution is None:
+            return ob.PlannerStatus.TIMEOUT
         problem.addSolutionPath(propagator.path(tree, self._solution))
         return ob.PlannerStatus.EXACT_SOLUTION
+
+    def _keep_path(self, path: IndexArray, seconds: float, transitions: int) -> None:
+        """Keep a path to the goal if it is the shortest so far."""
+        if self._solution is None or len(path) < len(self._solution):
+            self._solution = path
+            self._solutions.append(Solution(transitions, seconds, len(path) - 1))
 
     def _add_starts(self, propagator: BatchPropagator, goal: Any) -> int:
         """Add the start states that are not in the tree yet; return one that is in the goal, or -1."""
@@ -274,6 +306,8 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
         controls = _checked_controls(strategy, strategy.controls(tree, nodes), len(nodes))
         durations = _checked_durations(strategy, strategy.durations(tree, nodes), len(nodes))
         reached = propagator.expand(tree, nodes, controls, durations, goal)
+        if reached >= 0:
+            strategy.reached(tree, reached)
         if len(tree) > first:
             strategy.inserted(tree, first, len(tree))
         return reached

@@ -10,7 +10,7 @@ Differs: the loss is a mean over the mini-batch, and distances are measured in h
 dimensions of an action weigh the same.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,10 +51,10 @@ class DDPGArgmax(StackedAgent):
     settings: DDPGArgmaxSettings
     gradients = GRADIENTS
 
-    def update_inputs(self, first: int, count: int) -> Iterable[tuple[Any, ...]]:
+    def update_inputs(self, first: int, count: int) -> tuple[Sequence[Any] | Tensor, ...]:
         """Return rates and the candidates [S, N, A], in [-1, 1]."""
         drawn = uniform(self.stream_keys, first, count, (self.settings.candidates, self.action_size))
-        return zip(*self.adam_rates(first, count), torch.from_numpy(2.0 * drawn - 1.0).to(self.device), strict=True)
+        return *self.adam_rates(first, count), torch.from_numpy(2.0 * drawn - 1.0).to(self.device)
 
     def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor, candidates: Tensor) -> dict[str, Tensor]:
         """Make one update; see `StackedAgent.update`."""

@@ -13,11 +13,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import softplus
 
+from pbcs_ompl.agents.kernels.sac import LOG_STD
+
 Network = Callable[[Tensor], Tensor]
 """Outputs [S, B, out] for inputs [S, B, in]."""
-
-LOG_STD = -20.0, 2.0
-"""Bounds of the log standard deviation of SAC's policy; outside of them its gradient is 0 (Haarnoja et al., 2018)."""
 
 
 class ActionBox(NamedTuple):

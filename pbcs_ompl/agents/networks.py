@@ -14,8 +14,8 @@ import torch
 from torch import Tensor
 
 from pbcs_ompl.agents.initialisation import INITIALISATIONS, draw_layer, layer_shapes
+from pbcs_ompl.agents.kernels.layer_norm import LAYER_NORM_EPSILON
 from pbcs_ompl.agents.kernels.network import BETA_1, BETA_2
-from pbcs_ompl.agents.policy import LAYER_NORM_EPSILON
 from pbcs_ompl.core.errors import Mismatch
 
 ADAM_EPSILON = 1e-8

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbcs_ompl.agents.kernels.network import outputs
+from pbcs_ompl.agents.kernels.network import Shape, outputs, shape_of
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.types import Array, IndexArray
 
 Float32Array = NDArray[np.float32]
-LAYER_NORM_EPSILON = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +46,13 @@ class Policy:
 
     @property
     def is_plain(self) -> bool:
-        """Whether no layer is normalised."""
+        """Whether no layer is normalised; if not, all hidden ones are."""
         return all(len(layer) == 2 for layer in self.layers)
+
+    @property
+    def shape(self) -> Shape:
+        """The shape of the network."""
+        return shape_of(self.sizes, not self.is_plain)
 
     @cached_property
     def parameters(self) -> Float32Array:
@@ -58,24 +62,9 @@ class Policy:
     def act(self, observations: Array) -> Array:
         """Return the actions [B, A] for observations [B, O]."""
         values = observations.astype(np.float32)
-        if self.is_plain:
-            first = np.zeros(len(values), np.int64)
-            raw = outputs(self.sizes, self.parameters[None], values, first)
-        else:
-            raw = self._outputs(values)
+        first = np.zeros(len(values), np.int64)
+        raw = outputs(self.shape, self.parameters[None], values, first)
         return to_box(np.tanh(raw), self.action_low, self.action_high)
-
-    def _outputs(self, values: Float32Array) -> Float32Array:
-        for weight, bias, *norm in self.layers[:-1]:
-            values = values @ weight
-            values += bias
-            if norm:
-                values -= values.mean(axis=-1, keepdims=True)
-                values /= np.sqrt(np.square(values).mean(axis=-1, keepdims=True) + LAYER_NORM_EPSILON)
-                values = values * norm[0] + norm[1]
-            np.maximum(values, 0.0, out=values)
-        weight, bias = self.layers[-1]
-        return values @ weight + bias
 
     def blended(self, other: "Policy", share: float) -> "Policy":
         """Return the policy of the same sizes with the parameters (1 - share) p + share q.
@@ -121,19 +110,19 @@ class Policy:
 
 
 class PolicyStack:
-    """N policies of one action box that act together: compiled where their layers are plain and of the same sizes."""
+    """N policies of one action box that act together: compiled where their layers are alike."""
 
     def __init__(self, policies: Sequence[Policy]):
         self._policies = policies
         self._low, self._high = policies[0].action_low, policies[0].action_high
-        self._sizes = policies[0].sizes
-        alike = all(policy.is_plain and policy.sizes == self._sizes for policy in policies)
+        self._shape = policies[0].shape
+        alike = all(policy.shape == self._shape for policy in policies)
         self._parameters = np.array([policy.parameters for policy in policies]) if alike else None
 
     def act(self, observations: Array, chosen: IndexArray) -> Array:
         """Return the actions [B, A] of the policies `chosen` [B] for observations [B, O]."""
         if self._parameters is not None:
-            raw = outputs(self._sizes, self._parameters, observations.astype(np.float32), chosen)
+            raw = outputs(self._shape, self._parameters, observations.astype(np.float32), chosen)
             return to_box(np.tanh(raw), self._low, self._high)
         actions = np.empty((len(observations), len(self._low)))
         for index in set(chosen.tolist()):
@@ -158,6 +147,8 @@ def _check(layers: tuple[tuple[Float32Array, ...], ...], low: Array, high: Array
         before[1] == after[0] for before, after in pairwise(widths))
     if not chained or any(array.shape != (layer[0].shape[1],) for layer in layers for array in layer[1:]):
         raise DamagedFile(f"policy whose layers do not fit together: weights {widths}")
+    if {len(layer) for layer in layers[:-1]} not in ({2}, {4}, set()) or len(layers[-1]) != 2:
+        raise DamagedFile("policy with layers of which some are normalised, expected all hidden ones or none")
     if low.shape != (widths[-1][1],) or high.shape != low.shape:
         raise DamagedFile(f"policy with {widths[-1][1]} outputs and action bounds {low.shape}, {high.shape}")
     if not all(np.isfinite(array).all() for array in _all_arrays(layers, low, high)):

@@ -5,7 +5,7 @@ Densities are measured in half-widths of the box, as they are for a box of [-1, 
 of it as a `Policy`, is the deterministic tanh(mean).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import log
 from typing import Any
@@ -17,6 +17,7 @@ from torch import Tensor
 from pbcs_ompl.agents import losses
 from pbcs_ompl.agents.kernels.counter_rng import normal, stream_keys
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
+from pbcs_ompl.agents.kernels.updates import SAC_KERNEL
 from pbcs_ompl.agents.networks import TrainedNetwork, TrainedScalar
 from pbcs_ompl.agents.policy import to_box
 from pbcs_ompl.agents.replay import Batch
@@ -57,6 +58,7 @@ class SAC(StackedAgent):
     settings_type = SACSettings
     settings: SACSettings
     gradients = GRADIENTS
+    kernel = SAC_KERNEL
     outputs_per_action = 2
     num_critics = 2
 
@@ -76,12 +78,12 @@ class SAC(StackedAgent):
         """Return copies of `tensors()` for some seeds, by their indices."""
         return super().part(seeds) | {"num_samples": self._num_samples.clone()}
 
-    def update_inputs(self, first: int, count: int) -> Iterable[tuple[Any, ...]]:
+    def update_inputs(self, first: int, count: int) -> tuple[Sequence[Any] | Tensor, ...]:
         """Return rates, and noise [S, 2, B, A] for the actions in the next and in the present states."""
         rates = (*self.adam_rates(first, count),
                  self.rates_of(self.settings.temperature_learning_rate, range(first, first + count)))
         noise = normal(self.stream_keys, first, count, (2, self.settings.batch_size, self.action_size))
-        return zip(*rates, torch.from_numpy(noise).to(self.device), strict=True)
+        return *rates, torch.from_numpy(noise).to(self.device)
 
     def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor, temperature_rate: Tensor,
                noise: Tensor) -> dict[str, Tensor]:

@@ -25,7 +25,9 @@ import torch
 from torch import Tensor
 
 from pbcs_ompl.agents.inputs import INPUT_KINDS, PlainInputs
+from pbcs_ompl.agents.kernels.actor_critic import Constants
 from pbcs_ompl.agents.kernels.counter_rng import stream_keys
+from pbcs_ompl.agents.kernels.updates import Kernel, run
 from pbcs_ompl.agents.losses import ActionBox, td_targets
 from pbcs_ompl.agents.networks import MLP, Loss, TrainedNetwork, TrainedScalar, adam_rates, load_tensors
 from pbcs_ompl.agents.policy import Policy, to_box
@@ -58,6 +60,7 @@ class StackedAgent(ABC):
     Attributes:
         settings_type: The class of the settings.
         gradients: Hand-written gradients of some losses, such as `kernels.gradients.GRADIENTS`; none for autograd.
+        kernel: The updates as a compiled kernel for a CPU, if the algorithm has one.
         outputs_per_action: Outputs of the actor for each action; its first A, through a tanh, are the action.
         num_critics: Critics of each seed. They are one stack: the first ones of all seeds, then the second ones.
         actor, critic: The networks.
@@ -73,8 +76,15 @@ class StackedAgent(ABC):
 
     settings_type: ClassVar[type[AgentSettings]]
     gradients: ClassVar[Mapping[Loss, Callable[..., Any]]] = {}
+    kernel: ClassVar[Kernel | None] = None
     outputs_per_action: ClassVar[int] = 1
     num_critics: ClassVar[int] = 1
+
+    def __init_subclass__(cls) -> None:
+        """Let no kernel stand for an `update` that it was not written for."""
+        super().__init_subclass__()
+        if "update" in vars(cls) and "kernel" not in vars(cls):
+            cls.kernel = None
 
     def __init__(self, observation_size: int, action_low: Any, action_high: Any, *,
                  settings: AgentSettings | None = None, seeds: Sequence[int] = (0,),
@@ -114,19 +124,20 @@ class StackedAgent(ABC):
         """Make one update of all networks: update(batch, critic_rate, actor_rate, ...).
 
         Args:
-            arguments: A `Batch` [S, B, ...], then one item of `update_inputs`, which begins with the rates of this
-                step of Adam.
+            arguments: A `Batch` [S, B, ...], then an item of each sequence of `update_inputs`, the first ones of which
+                are the rates of this step of Adam.
 
         Returns:
             The losses [S] by name.
         """
 
-    def update_inputs(self, first: int, count: int) -> Iterable[tuple[Any, ...]]:
+    def update_inputs(self, first: int, count: int) -> tuple[Sequence[Any] | Tensor, ...]:
         """Return the arguments of `update` after the mini-batch, for updates number first, first + 1, ... (from 1).
 
-        An algorithm that needs random numbers draws them here, for many updates at once.
+        Each is a sequence (or tensor) of `count` items, one for each update. An algorithm that needs random numbers
+        draws them here, for many updates at once.
         """
-        return zip(*self.adam_rates(first, count), strict=True)
+        return self.adam_rates(first, count)
 
     def adam_rates(self, first: int, count: int) -> tuple[Tensor, Tensor]:
         """Return the rates of the critic's and the actor's steps number first, first + 1, ..., [count, 2] each."""
@@ -273,8 +284,17 @@ class StackedAgent(ABC):
     def run_updates(self, rows: Tensor, first: int) -> dict[str, np.ndarray]:
         """Make updates number first, first + 1, ... with rows [K, S, B, W]; return losses [K, S] by name."""
         inputs = self.update_inputs(first, len(rows))
-        steps = [self._run_update(batch, *more) for batch, more in zip(rows.unbind(), inputs, strict=True)]
+        if self.kernel is not None and self._kernel_serves():
+            constants = Constants(self.box.half.numpy(), self.box.centre.numpy(), np.float32(self.settings.discount),
+                                  np.float32(1.0 - self.settings.polyak))
+            return run(self.kernel, rows, inputs, list(self._trained.values()), constants)
+        steps = [self._run_update(*step) for step in zip(rows.unbind(), *inputs, strict=True)]
         return {name: torch.stack([step[name] for step in steps]).double().cpu().numpy() for name in steps[0]}
+
+    def _kernel_serves(self) -> bool:
+        """Whether updates may be made by the kernel: on a CPU, unless another way was asked for."""
+        plain = bool(self.gradients) and not self.inputs.late_actions
+        return self.compile == "auto" and self.device.type == "cpu" and plain
 
     def _update_rows(self, rows: Tensor, *inputs: Any) -> dict[str, Tensor]:
         return self.update(self.replay.unpack(rows), *inputs)

@@ -3,16 +3,18 @@
 Differs: none. Noise and its bound are measured in half-widths of the action box, as they are for a box of [-1, 1].
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from pbcs_ompl.agents import losses
 from pbcs_ompl.agents.kernels.counter_rng import normal
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
+from pbcs_ompl.agents.kernels.updates import TD3_KERNEL
 from pbcs_ompl.agents.replay import Batch
 from pbcs_ompl.agents.settings import AgentSettings
 from pbcs_ompl.agents.stacked_agent import StackedAgent
@@ -48,16 +50,19 @@ class TD3(StackedAgent):
     settings_type = TD3Settings
     settings: TD3Settings
     gradients = GRADIENTS
+    kernel = TD3_KERNEL
     num_critics = 2
 
-    def update_inputs(self, first: int, count: int) -> Iterable[tuple[Any, ...]]:
+    def update_inputs(self, first: int, count: int) -> tuple[Sequence[Any] | Tensor, ...]:
         """Return rates, the noise [S, B, A] on the target's actions, and whether actor and targets are updated."""
         numbers, delay = range(first, first + count), self.settings.policy_delay
         critic_rates, _ = self.adam_rates(first, count)
         actor_rates = self.rates_of(self.settings.actor_learning_rate, [-(-n // delay) for n in numbers])
+        bound = np.float32(self.settings.target_noise_clip)
         noise = normal(self.stream_keys, first, count, (self.settings.batch_size, self.action_size))
+        noise = np.clip(np.float32(self.settings.target_noise) * noise, -bound, bound)
         full = [number % delay == 0 for number in numbers]
-        return zip(critic_rates, actor_rates, torch.from_numpy(noise).to(self.device), full, strict=True)
+        return critic_rates, actor_rates, torch.from_numpy(noise).to(self.device), full
 
     def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor, noise: Tensor,
                full: bool) -> dict[str, Tensor]:
@@ -73,9 +78,7 @@ class TD3(StackedAgent):
         return {"critic_loss": critic_loss, "actor_loss": actor_loss}
 
     def smoothed_targets(self, batch: Batch, noise: Tensor) -> Tensor:
-        """Return y = r + discount min_i Q'_i(s', pi'(s') + clipped noise) [S, B, 1], or r at the end."""
-        bound = self.settings.target_noise_clip
-        noise = (noise * self.settings.target_noise).clamp_(-bound, bound)
+        """Return y = r + discount min_i Q'_i(s', pi'(s') + noise) [S, B, 1], or r at the end."""
         squashed = self.actor.target(batch.next_observations).tanh_().add_(noise).clamp_(-1.0, 1.0)
         inputs = self.box.join(batch.next_observations, squashed).repeat(2, 1, 1)
         next_values = torch.minimum(*self.critic.target(inputs).chunk(2))

@@ -1,7 +1,7 @@
 """Plan in any environment that can be reset, with any planner."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -13,9 +13,9 @@ from ompl import base as ob
 from pbcs_ompl.bridge.coverage import Coverage, TransitionRecorder
 from pbcs_ompl.bridge.improvement.allowance import Allowance, Improvement
 from pbcs_ompl.bridge.improvement.improve import improve as improve_plan
-from pbcs_ompl.bridge.planner_spec import PlannerSpec, as_batch_planner
+from pbcs_ompl.bridge.planner_spec import PlannerSpec, as_anytime_planner, as_batch_planner
 from pbcs_ompl.bridge.problem import CallbackState, Problem, make_problem
-from pbcs_ompl.bridge.termination import Limits, checked_limits, make_stop
+from pbcs_ompl.bridge.termination import Limits, checked_limits, make_stop, stop_after_first
 from pbcs_ompl.bridge.trajectory import Trajectory, to_trajectory, trajectory_of
 from pbcs_ompl.bridge.tree import load_tree, save_tree, tree_of
 from pbcs_ompl.bridge.verification import Verification, verify
@@ -28,7 +28,7 @@ from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.signals import interruptible
 from pbcs_ompl.core.tree import Tree
-from pbcs_ompl.core.types import Counter, ProgressCallback
+from pbcs_ompl.core.types import Counter, ProgressCallback, Solution
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
@@ -46,10 +46,10 @@ class PlanResult:
         solved: Whether the plan, executed in a fresh environment by `reset` and `step` alone, reaches the goal.
         found: Whether the planner believes to have reached it; where it is not `solved` then, `reason` says why.
         reason: Why it is not solved; None when it is.
-        transitions: Environment steps that were made.
+        transitions: Environment steps that the search made, until its first solution.
         collision_checks: How often the environment was asked whether something collides: by every transition, and
             by every state that OMPL made up itself.
-        seconds: Wall time of the search alone, without compilation.
+        seconds: Wall time of the search alone, without compilation, until its first solution.
         nodes: Size of the tree.
         path_length: Steps of the trajectory; None when none was found.
         replay_ok: Whether the trajectory gave the same states bit for bit in that environment; None when none was
@@ -61,8 +61,14 @@ class PlanResult:
         trajectory: The path found, solved or not; None when none was.
         tree: What was explored.
         coverage: How much of the feature space was seen after how many transitions; None unless asked for.
-        improvement: What making the plan shorter has brought and used beside the search, whose numbers the others are;
-            None unless asked for.
+        improvement: What making the plan shorter has brought and used beside the search, whose numbers the others are,
+            or what a planner has that continues after its first solution (such as SSTCompiled); else None.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.plan("pbcs/Maze-v0", "KPIECE1", seed=0)
+        >>> result.path_length == len(result.trajectory.actions)
+        True
     """
 
     solved: bool
@@ -118,7 +124,8 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "R
         max_seconds: The most wall time of the search; None for any.
         out: A new folder for config.toml, result.json, tree.npz and, when solved, trajectory.npz.
         improve: What may be used after the search to make the plan shorter: 5000 transitions, "10%" of those of the
-            search, or "2s" of wall time; None for nothing.
+            search, or "2s" of wall time. A planner that continues after its first solution uses it itself; for None,
+            all of its budget.
         coverage: Report how much of the feature space was seen after how many transitions, in the result's `coverage`.
         on_progress: Called a few times a second with {"transitions", "seconds"}.
 
@@ -127,6 +134,12 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "R
         PlannerUnavailable: the installed OMPL cannot build the planner.
         CallbackFailed: the environment or the strategy raised, or returned NaN.
         RunFolderError: `out` exists, is in use, or cannot be written.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.plan("pbcs/Maze-v0", env_kwargs={"size": 3}, seed=0)
+        >>> result.solved, result.replay_ok
+        (True, True)
     """
     limits = checked_limits(max_transitions, max_seconds)
     allowance = None if improve is None else Allowance.of(improve)
@@ -141,17 +154,17 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "R
         recorder = TransitionRecorder(model) if coverage else None
         with quiet_ompl(), make_problem(model, seed=seed, counter=Counter(limits.max_transitions),
                                         recorder=recorder) as problem:
-            found = _search(problem, spec, seed, limits, on_progress)
-        transitions = problem.callbacks.counter.count
-        trajectory, improvement, verdict = _judged(found, model, allowance, seed, transitions)
+            found = _search(problem, spec, seed, limits, allowance, on_progress)
+        trajectory, improvement, verdict = _judged(found, model, allowance, seed)
+        transitions = found.until_first.transitions
         result = PlanResult(
             solved=verdict.solved, found=trajectory is not None, reason=verdict.reason, transitions=transitions,
-            collision_checks=transitions + problem.callbacks.validity_checks, seconds=found.seconds,
+            collision_checks=transitions + problem.callbacks.validity_checks, seconds=found.until_first.seconds,
             nodes=len(found.tree), path_length=None if trajectory is None else trajectory.length,
             replay_ok=verdict.replays, planner=spec.name, env=model.spec.id, seed=seed, improvement=improvement,
             out=None if out is None else str(out),
             planner_settings=found.settings, trajectory=trajectory, tree=found.tree,
-            coverage=None if recorder is None else recorder.coverage(found.tree, transitions, found.seconds))
+            coverage=None if recorder is None else recorder.coverage(found.tree, found.transitions, found.seconds))
         if folder is not None:
             _write(folder, result, config)
     return result
@@ -175,15 +188,20 @@ def read_plan(folder: str | Path) -> PlanResult:
         raise DamagedFile(f"{path / RESULT} is not the result of a plan: {error}") from error
 
 
-def _judged(found: "_Found", model: ResettableModel, allowance: Allowance | None, seed: int,
-            transitions: int) -> tuple[Trajectory | None, Improvement | None, Verification]:
-    """Return the plan, shorter where that is asked for and the environment grants the shorter one, and the verdict."""
+def _judged(found: "_Found", model: ResettableModel, allowance: Allowance | None,
+            seed: int) -> tuple[Trajectory | None, Improvement | None, Verification]:
+    """Return the plan, shorter where that is asked for and the environment grants the shorter one, and the verdict.
+
+    A search that continued after its first solution has used the allowance itself.
+    """
     given = found.trajectory
     if given is None:
         return None, None, NOTHING_FOUND
-    if allowance is None:
+    if found.continued:
+        return given, Improvement.of_search(found.solutions, found.transitions, found.seconds), verify(given, model)
+    if allowance is None or allowance.nothing:
         return given, None, verify(given, model)
-    shorter, improvement = improve_plan(given, model, allowance.after(transitions), seed=seed, tree=found.tree)
+    shorter, improvement = improve_plan(given, model, allowance.after(found.transitions), seed=seed, tree=found.tree)
     verdict = verify(shorter, model)
     if verdict.solved or shorter is given:
         return shorter, improvement, verdict
@@ -215,7 +233,7 @@ def _warm_up(model: ResettableModel, spec: PlannerSpec, planner: Any) -> None:
         toy = model if pure else make(TOY)
         small = spec if pure else PlannerSpec(planner, {})
         with quiet_ompl(), make_problem(toy, counter=Counter(WARM_UP.max_transitions)) as problem:
-            _search(problem, small, 0, WARM_UP, None)
+            _search(problem, small, 0, WARM_UP, None, None)
 
 
 class _Found(NamedTuple):
@@ -224,10 +242,22 @@ class _Found(NamedTuple):
     trajectory: Trajectory | None
     tree: Tree
     settings: dict[str, Any]
+    transitions: int
     seconds: float
+    solutions: Sequence[Solution]
+
+    @property
+    def continued(self) -> bool:
+        """Whether the search continued after its first solution."""
+        return len(self.solutions) > 0 and self.solutions[0].transitions < self.transitions
+
+    @property
+    def until_first(self) -> Solution:
+        """What the search took until its first solution, or in all."""
+        return self.solutions[0] if self.continued else Solution(self.transitions, self.seconds, 0)
 
 
-def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
+def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits, allowance: Allowance | None,
             on_progress: ProgressCallback | None) -> _Found:
     setup, callbacks = problem.setup, problem.callbacks
     with code_of_others(f"the planner {spec.name!r}"):
@@ -238,6 +268,9 @@ def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
         setup.setPlanner(planner)
         setup.setup()
     stop = make_stop(callbacks, limits.max_seconds, on_progress)
+    anytime = as_anytime_planner(planner)
+    if anytime is not None and allowance is not None:
+        stop = stop_after_first(stop, anytime, callbacks.counter, allowance)
     if callbacks.recorder is not None:
         stop = callbacks.recorder.timed(stop, callbacks.counter)
     with interruptible(callbacks.fail):
@@ -250,7 +283,8 @@ def _search(problem: Problem, spec: PlannerSpec, seed: int, limits: Limits,
     callbacks.raise_error()
     with code_of_others(f"the planner {spec.name!r}"):
         tree = tree_of(planner, problem.space_information)
-        return _Found(_solution(problem, batch_planner, spec, seed), tree, spec.settings(planner), seconds)
+        return _Found(_solution(problem, batch_planner, spec, seed), tree, spec.settings(planner),
+                      callbacks.counter.count, seconds, anytime.solutions if anytime is not None else [])
 
 
 def _keep_error(planner: BatchPlanner, callbacks: CallbackState) -> None:

@@ -9,7 +9,7 @@ from ompl import base as ob
 from pbcs_ompl.core import registry
 from pbcs_ompl.core.callbacks import callback_failed, code_of_others, describe
 from pbcs_ompl.core.errors import InvalidOption, PbcsError
-from pbcs_ompl.core.interfaces import BatchPlanner, PlannerFactory
+from pbcs_ompl.core.interfaces import AnytimePlanner, BatchPlanner, PlannerFactory
 from pbcs_ompl.core.options import check_names
 
 
@@ -92,6 +92,11 @@ class PlannerSpec:
 def as_batch_planner(planner: Any) -> BatchPlanner | None:
     """Return an OMPL planner if it can propagate batches, else None."""
     return planner if isinstance(planner, BatchPlanner) else None
+
+
+def as_anytime_planner(planner: Any) -> AnytimePlanner | None:
+    """Return an OMPL planner if it says when it found which solutions, else None."""
+    return planner if isinstance(planner, AnytimePlanner) else None
 
 
 def _name_of(source: Any) -> str:

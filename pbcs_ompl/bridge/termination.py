@@ -4,9 +4,11 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
+from pbcs_ompl.bridge.improvement.allowance import Allowance
 from pbcs_ompl.bridge.problem import CallbackState
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.core.types import ProgressCallback
+from pbcs_ompl.core.interfaces import AnytimePlanner
+from pbcs_ompl.core.types import Counter, ProgressCallback
 
 SECONDS_BETWEEN_REPORTS = 0.25
 
@@ -54,3 +56,30 @@ def make_stop(callbacks: CallbackState, max_seconds: float | None,
         return callbacks.stopped or now >= deadline
 
     return stop
+
+
+def stop_after_first(stop: Callable[[], bool], planner: AnytimePlanner, counter: Counter,
+                     allowance: Allowance) -> Callable[[], bool]:
+    """Return `stop` that also ends a planner which continues after its first solution, once an allowance is used up.
+
+    Args:
+        stop: What ends it at the latest.
+        planner: The planner.
+        counter: Its transitions, whose budget is set once there is a solution.
+        allowance: What it may use after its first solution.
+    """
+    deadline = float("inf")
+    found = False
+
+    def stop_continued() -> bool:
+        nonlocal deadline, found
+        if not found and planner.solutions:
+            found, left = True, allowance.after(counter.count)
+            if left.transitions is not None:
+                most = counter.count + left.transitions
+                counter.budget = most if counter.budget is None else min(counter.budget, most)
+            if left.seconds is not None:
+                deadline = time.monotonic() + left.seconds
+        return stop() or time.monotonic() >= deadline
+
+    return stop_continued

@@ -40,6 +40,15 @@ class Trajectory:
         reset_seed: The seed of the reset that leads to the first state; None where it is not the state of a reset, and
             the trajectory cannot be executed in a fresh environment.
         versions: Versions of the packages the steps depend on.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> plan = pbcs_ompl.plan("pbcs/Maze-v0", seed=0).trajectory
+        >>> len(plan.states) == len(plan.actions) + 1
+        True
+        >>> path = plan.save("plan.npz")
+        >>> bool((pbcs_ompl.Trajectory.load("plan.npz").states == plan.states).all())
+        True
     """
 
     environment: EnvSpec

@@ -354,7 +354,8 @@ def _add_budget(verb: Parser, default: int) -> None:
 def _add_improve(verb: Parser) -> None:
     verb.add_argument("--improve", type=amount, metavar="AMOUNT",
                       help="make the plan shorter afterwards: with 5000 transitions, 10%% of those of the search, "
-                           "or in 2s")
+                           "or in 2s; planners that continue after a first solution (SSTCompiled, RidesSST) use it "
+                           "themselves, and without it all of their budget")
 
 
 def _add_trust(verb: Parser, source: str) -> None:

@@ -9,7 +9,6 @@ from pbcs_ompl.cli.executor import executor
 from pbcs_ompl.cli.folders import fresh_folder
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.core.formatting import format_value
 from pbcs_ompl.core.signals import with_remedy
 from pbcs_ompl.experiments.records import record_file
 from pbcs_ompl.experiments.run import Shard
@@ -19,7 +18,9 @@ from pbcs_ompl.experiments.workers.schedulers import makefile, slurm_script
 from pbcs_ompl.results.command_line import command, report_words, shell, study_words
 from pbcs_ompl.results.files import write_text
 
-VERDICTS = {True: "agrees", False: "DIFFERS", None: "not enough runs"}
+VERDICTS = {True: "agrees", False: "DIFFERS", None: "undecided"}
+SHOWN = 2
+"""Rates beside a claim on the screen; all its numbers are in `result.json` and in the report."""
 
 
 def run(arguments: Namespace) -> int:
@@ -95,10 +96,18 @@ def _failures(failed: dict[str, str]) -> list[tuple[str, str]]:
 
 def _closing_lines(title: str, summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
     lines = [(summary["id"], f"{title}: {summary['runs']} runs")]
-    for claim in summary["agrees"]:
-        lines.append((VERDICTS[claim["agrees"]], f"{claim['claim']}  ({claim['source']})"))
-        lines += [("", f"{name}: {format_value(value)}") for name, value in claim["numbers"].items()]
-        lines += [("", claim["note"])] if claim["note"] else []
+    lines += [(VERDICTS[claim["agrees"]], in_one_line(claim)) for claim in summary["agrees"]]
     lines += _failures(summary["failed"])
-    return [*lines, ("figures", ", ".join(summary["figures"]) or "none"), ("files", list_files(out)),
-            ("next", command(report_words(out)))]
+    pictures = sorted(Path(figure).stem for figure in summary["figures"])
+    return [*lines, ("figures", f"{out / 'figures'}/ ({', '.join(pictures) or 'none'})"), ("files", list_files(out)),
+            ("numbers", str(out / "result.json")), ("next", command(report_words(out)))]
+
+
+def in_one_line(claim: dict[str, Any]) -> str:
+    """Write a claim, the numbers that say most about it, and what it lacks."""
+    numbers = claim["numbers"]
+    rates = [f"{value['successes']}/{value['n']}" for value in numbers.values()
+             if isinstance(value, dict) and "wilson" in value][:SHOWN]
+    chances = [f"p = {value:.2g}" if value else "p < 1e-5" for name, value in numbers.items() if name.startswith("p ")]
+    missing = [claim["note"]] if claim["agrees"] is None and claim["note"] else []
+    return f"{claim['claim']}: {'; '.join([', '.join(rates + chances), *missing]).strip('; ')}".rstrip(": ")

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from pbcs_ompl.cli.bar import Bar
 
 SECONDS_BETWEEN_LINES = 10.0
+FORESEEN, SETTLED = 0.05, 5.0
+"""The time left is shown once this share is done, or after this many seconds: before, it is a wild guess."""
+AT_ONCE = 1.0
+"""What is reported in fewer seconds was there before: runs that were read, for instance."""
 
 
 class ProgressDisplay:
@@ -36,6 +40,7 @@ class ProgressDisplay:
                  max_seconds: float | None = None):
         self._label, self._count, self._budget, self._max_seconds = label, count, budget, max_seconds
         self._bar = _bar(label)
+        self._before: tuple[float, float] | None = None
 
     def __enter__(self) -> "ProgressDisplay":
         self._start = self._last_line = time.monotonic()
@@ -52,6 +57,8 @@ class ProgressDisplay:
         now = time.monotonic()
         seconds = now - self._start
         share = self._share(numbers, seconds)
+        if self._before is None:
+            self._before = (numbers.get(self._count, 0), share or 0.0) if seconds < AT_ONCE else (0, 0.0)
         text = f"{self._label}: {self._describe(numbers, seconds, share)}"
         if self._bar is not None:
             self._bar.show(text, share, numbers.get("table", []))
@@ -70,13 +77,17 @@ class ProgressDisplay:
         return min(1.0, max(shares)) if shares else None
 
     def _describe(self, numbers: dict[str, Any], seconds: float, share: float | None) -> str:
+        count_before, share_before = self._before or (0, 0.0)
         parts = [f"{name.replace('_', ' ')} {format_number(value)}" for name, value in numbers.items()
                  if name not in ("seconds", "covered", "table")]
         if seconds > 0 and self._count in numbers:
-            parts.append(f"{format_number(numbers[self._count] / seconds)} {self._count}/s")
-        if share:
-            bound = f"{share:.0%} of the plan covered, about" if "covered" in numbers else "at most"
-            parts.append(f"{bound} {format_duration(seconds * (1 - share) / share)} left")
+            parts.append(f"{format_number((numbers[self._count] - count_before) / seconds)} {self._count}/s")
+        if share and "covered" in numbers:
+            parts.append(f"{share:.0%} of the plan covered")
+        done = (share or 0.0) - share_before
+        if share and done > 0.0 and (done >= FORESEEN or seconds >= SETTLED):
+            bound = "about" if "covered" in numbers else "at most"
+            parts.append(f"{bound} {format_duration(seconds * (1 - share) / done)} left")
         return ", ".join(parts)
 
 

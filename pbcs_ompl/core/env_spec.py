@@ -41,6 +41,11 @@ class EnvSpec:
 
     Raises:
         InvalidOption: a value has another type, `start_seed` is not >= 0, or `max_episode_steps` not >= 1.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> pbcs_ompl.EnvSpec("pbcs/Maze-v0", {"size": 5, "maze_seed": 1}).id
+        'pbcs/Maze-v0'
     """
 
     id: str

@@ -12,7 +12,7 @@ import numpy as np
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import PbcsError
 from pbcs_ompl.core.tree import Tree
-from pbcs_ompl.core.types import Array, BoolArray, Capability, Counter, IndexArray, Transition
+from pbcs_ompl.core.types import Array, BoolArray, Capability, Counter, IndexArray, Solution, Transition
 
 
 class ResettableModel(Protocol):
@@ -175,6 +175,16 @@ class BatchPlanner(Protocol):
 
     def use_model(self, model: ResettableModel, counter: Counter) -> None:
         """Propagate through `model` from now on, and count every transition in `counter`."""
+        ...
+
+
+@runtime_checkable
+class AnytimePlanner(BatchPlanner, Protocol):
+    """A batch planner that says when it found which solutions; it may go on after the first one."""
+
+    @property
+    def solutions(self) -> list[Solution]:
+        """When the last `solve` found a path shorter than all before, and its steps."""
         ...
 
 

@@ -40,6 +40,17 @@ class Transition(NamedTuple):
         return self.terminated if self.truncated is None else self.terminated | self.truncated
 
 
+class Solution(NamedTuple):
+    """A path to the goal that a search has found."""
+
+    transitions: int
+    """Those of the search until then."""
+    seconds: float
+    """Since the search began."""
+    steps: int
+    """Of the path."""
+
+
 class Counter:
     """Counts transitions against a budget, in one place for all planners.
 

@@ -5,6 +5,7 @@ note says how many would decide. Rates are compared by Fisher's exact test, pair
 others by Mann and Whitney's ranks; one rate is compared with a bar by its 95 % Wilson interval.
 """
 
+from bisect import bisect_left
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
@@ -20,8 +21,8 @@ Key = TypeVar("Key", bound=Hashable)
 Rate = dict[str, Any]
 """What `rate` returns."""
 SIGNIFICANCE, POWER = 0.05, 0.8
-WORTH = 0.4
-"""Rates that are this far apart must be separable before a study says that they do not differ."""
+APART = (0.7, 0.3)
+"""Two rates that must be separable before a study says that rates do not differ, where its source gives none."""
 RARE = 0.1
 """What was never seen is said to be absent where the interval of its rate ends below this number."""
 FEWEST_PAIRS = 5
@@ -131,26 +132,26 @@ def about(claim: str, name: str, found: Rate, expected: float, tolerance: float,
                  source, "" if verdict is not None else _too_few(found["n"], needed))
 
 
-def higher(claim: str, first: Rate, second: Rate, names: tuple[str, str], source: str) -> Claim:
+def higher(claim: str, first: Rate, second: Rate, names: tuple[str, str], source: str,
+           expected: tuple[float, float] = APART) -> Claim:
     """Claim that the first rate is higher, by Fisher's exact test, one-sided.
 
-    Not so where the test shows the opposite, or could have separated rates that are `WORTH` apart (power 0.8).
+    Not so where the test shows the opposite, or would have shown the expected rates in four cases of five.
 
     Args:
         claim: The sentence.
         first, second: The rates.
         names: What to call the two.
         source: Where the claim comes from.
+        expected: The two rates that the source gives, the higher one first.
     """
     up, down = (_fisher(*pair) for pair in ((first, second), (second, first)))
-    sizes = first["n"], second["n"]
-    mean = 2.0 / sum(1.0 / n for n in sizes) if min(sizes) else 0.0
-    needed = fewest_runs(WORTH)
-    verdict = True if up < SIGNIFICANCE else False if down < SIGNIFICANCE or mean >= needed else None
+    able = min(first["n"], second["n"]) > 0 and _power((first["n"], second["n"]), expected) >= POWER
+    verdict = True if up < SIGNIFICANCE else False if down < SIGNIFICANCE or able else None
     return Claim(f"{claim} (p < {SIGNIFICANCE})", verdict,
                  {names[0]: first, names[1]: second, "p uncorrected (Fisher)": round(up, 5)}, source,
-                 "" if verdict is not None else
-                 f"not enough runs: {needed} of each separate rates that are {WORTH:g} apart")
+                 "" if verdict is not None else f"not enough runs: {fewest_runs(*expected)} of each separate rates of "
+                                                f"{expected[0]:g} and {expected[1]:g}")
 
 
 def no_higher(claim: str, first: Rate, second: Rate, names: tuple[str, str], source: str) -> Claim:
@@ -216,21 +217,22 @@ def _medians(names: tuple[str, str], *columns: np.ndarray) -> dict[str, Any]:
 def _fisher(first: Rate, second: Rate) -> float:
     """Return p of the one-sided test that the first rate is higher."""
     wins, trials = first["successes"] + second["successes"], first["n"] + second["n"]
-    return float(hypergeom.sf(first["successes"] - 1, trials, wins, first["n"]))
+    return float(hypergeom.sf(first["successes"] - 1, trials, wins, first["n"])) if trials else 1.0
 
 
 @cache
-def fewest_runs(worth: float) -> int:
-    """Return how many runs of each kind separate two rates that are `worth` apart around a half, with power 0.8."""
-    return next((runs for runs in range(2, MOST_RUNS) if _power(runs, worth) >= POWER), MOST_RUNS)
+def fewest_runs(high: float, low: float) -> int:
+    """Return how many runs of each kind separate two rates by Fisher's test with a power of 0.8, or `MOST_RUNS`."""
+    return bisect_left(range(MOST_RUNS), True, key=lambda runs: _power((runs, runs), (high, low)) >= POWER)
 
 
-def _power(runs: int, worth: float) -> float:
-    """Return how likely Fisher's test with that many runs of each shows that 0.5 + worth / 2 > 0.5 - worth / 2."""
-    counts = np.arange(runs + 1)
-    one, other = counts[:, None], counts[None]
-    significant = hypergeom.sf(one - 1, 2 * runs, one + other, runs) < SIGNIFICANCE
-    chances = (binom.pmf(counts, runs, 0.5 + way * worth / 2.0) for way in (1.0, -1.0))
+@cache
+def _power(sizes: tuple[int, int], rates: tuple[float, float]) -> float:
+    """Return how likely Fisher's test with `sizes` runs shows that the first of two true rates is the higher one."""
+    one, other = (np.arange(size + 1) for size in sizes)
+    together = one[:, None] + other[None]
+    significant = hypergeom.sf(one[:, None] - 1, sum(sizes), together, sizes[0]) < SIGNIFICANCE
+    chances = (binom.pmf(counts, size, chance) for counts, size, chance in zip((one, other), sizes, rates, strict=True))
     return float(np.einsum("ij,i,j->", significant, *chances))
 
 

@@ -40,6 +40,12 @@ class Comparison:
             corrected for the number of all tests of the comparison.
         runs: One record for each run.
         database: The database for Planner Arena; None when no folder was asked for.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> found = pbcs_ompl.compare(["Rides", "Ex"], "pbcs/Maze-v0", seeds=2)
+        >>> len(found.runs), len(found.tests)
+        (4, 1)
     """
 
     rows: list[dict[str, Any]]
@@ -95,6 +101,12 @@ def compare(planners: Sequence[str] | Mapping[str, Options], env: Environment | 
         UnknownName, InvalidOption, NotResettable, UnsupportedSpace: wrong input.
         RunFolderError: `out` holds something else, is in use, or cannot be written.
         DamagedFile: a record in `out` is damaged.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> found = pbcs_ompl.compare(["Rides", "Ex"], "pbcs/Maze-v0", env_kwargs={"size": 3}, seeds=2)
+        >>> [row["solved"] for row in found.rows]
+        [2, 2]
     """
     limits = Limits(None if max_seconds is None else max_seconds + SECONDS_OF_GRACE, max_memory)
     executor = make_executor(jobs)

@@ -35,7 +35,8 @@ PROPERTIES: dict[str, Callable[[Record], Any]] = {
     "coverage REAL": itemgetter("coverage"), "seed INTEGER": itemgetter("seed"),
 }
 """The columns of a run: those of OMPL's own benchmark, from the transitions on ours."""
-PROGRESS = {"time REAL": "seconds", "transitions INTEGER": "transitions", "coverage REAL": "coverage"}
+PROGRESS = ("time REAL", "transitions INTEGER", "coverage REAL", "best cost REAL")
+"""The columns of a sample; the cost of a solution is its steps, under the name that OMPL's planners use."""
 
 
 def write_logs(folder: Path, sweep: Sweep, records: Sequence[Record]) -> list[Path]:
@@ -117,14 +118,37 @@ def _planner(sweep: Sweep, planner: str, records: Sequence[Record]) -> Iterator[
     yield f"{len(PROGRESS)} progress properties for each run"
     yield from PROGRESS
     yield f"{len(records)} runs"
-    yield from (_series(record["progress"]) for record in records)
+    yield from (_series(record) for record in records)
     yield "."
 
 
-def _series(progress: dict[str, list[float]] | None) -> str:
-    """Return the measurements of a run as `time,transitions,coverage,;...;`."""
-    columns = [] if progress is None else [progress[name] for name in PROGRESS.values()]
-    return "".join("".join(f"{_data(value)}," for value in sample) + ";" for sample in zip(*columns, strict=True))
+def _series(record: Record) -> str:
+    """Return the measurements of a run as `time,transitions,coverage,cost,;...;`, one for each time.
+
+    The coverage of a plan that was made shorter after its search is known until then.
+    """
+    progress = record["progress"] or {"seconds": [], "transitions": [], "coverage": []}
+    shares = {time: (made, share) for time, made, share in zip(progress["seconds"], progress["transitions"],
+                                                               progress["coverage"], strict=True)}
+    costs = {time: (made, cost) for time, made, cost in _costs(record)}
+    series, best = "", None
+    for time in sorted(shares | costs):
+        made, share = shares.get(time, (None, None))
+        made, best = costs.get(time, (made, best))
+        series += "".join(f"{_data(value)}," for value in (time, made, share, best)) + ";"
+    return series
+
+
+def _costs(record: Record) -> list[tuple[float, int, int]]:
+    """Return after how many seconds and transitions a run had a shorter plan, and its steps."""
+    if not record["solved"]:
+        return []
+    note = record.get("improvement")
+    if note is None:
+        return [(record["seconds"], record["transitions"], record["path_length"])]
+    progress = note["progress"]
+    return [(record["seconds"] + seconds, record["transitions"] + made, length) for seconds, made, length
+            in zip(progress["seconds"], progress["transitions"], progress["length"], strict=True)]
 
 
 def _data(value: Any) -> str:

@@ -32,6 +32,12 @@ class StudyResult:
         out: The folder with the files.
         figures: The pictures.
         agrees: The claims.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.run_study("control-duration", out="runs/durations", from_records=True)
+        >>> result.failed
+        {}
     """
 
     id: str
@@ -88,6 +94,12 @@ def run_study(study: Study | str | Path, *, out: str | Path, seeds: int | None =
         RunFolderError: `out` holds something else, is in use, or cannot be written.
         DamagedFile: a record in `out` is damaged.
         PbcsError: two runs of one name, or all runs failed.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.run_study("tree-pitfalls", out="runs/pitfalls", from_records=True)
+        >>> len(result.figures)
+        2
     """
     chosen, executor, limits = _study(study), make_executor(jobs), Limits(max_seconds, max_memory)
     shipped: dict[str, Record] = {}

@@ -13,6 +13,8 @@ Rates = Mapping[str, Mapping[str, tuple[int, int]]]
 """For each series the (successes, trials) of each group."""
 Values = Mapping[str, Mapping[str, Sequence[float]]]
 """For each series the values of each group."""
+LINE, KEY = 100, 8
+"""Letters of the legend across the figure, and those that a key takes."""
 
 
 def rates_figure(rates: Rates, *, title: str = "", xlabel: str = "", ylabel: str = "share of solved runs") -> Figure:
@@ -92,5 +94,7 @@ def _range(counts: Sequence[int]) -> str:
 def _finish(figure: Figure, axes: Axes, title: str, xlabel: str) -> None:
     axes.set_title(title, fontsize=10)
     axes.set_xlabel(xlabel)
-    if axes.get_legend_handles_labels()[0]:
-        figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    labels = axes.get_legend_handles_labels()[1]
+    if labels:
+        columns = min(4, max(1, LINE // (max(map(len, labels)) + KEY)))
+        figure.legend(loc="outside lower center", ncols=columns, frameon=False, fontsize=9)

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from cycler import cycler
-from matplotlib import rc_context
+from matplotlib import colormaps, rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -34,6 +34,11 @@ def style() -> AbstractContextManager[None]:
 def colour(index: int) -> str:
     """Return the colour of a category by its number."""
     return PALETTE[index % len(PALETTE)]
+
+
+def shade(index: int, count: int) -> tuple[float, ...]:
+    """Return the colour of one of `count` curves that differ in a growing quantity."""
+    return tuple(colormaps[QUANTITIES](0.92 * index / max(1, count - 1)))
 
 
 def new_figure(width: float = 6.4, height: float = 6.4) -> tuple[Figure, Axes]:

@@ -14,10 +14,12 @@ from pbcs_ompl.core.types import Array
 from pbcs_ompl.figures.canvas import WALL, new_figure
 
 GOAL = "#f1c40f"
+ALIKE = 4.0
+"""Two dimensions without walls are drawn at equal scale where one extends over up to this many times the other."""
 
 
 def map_axes(model: ResettableModel, title: str) -> tuple[Figure, Axes]:
-    """Return a figure whose axes show the model's walls and goal, at equal scale.
+    """Return a figure whose axes show the model's walls and goal; see `draw_map`.
 
     Raises:
         Mismatch: the feature has fewer than two dimensions, so there is no plane to draw.
@@ -29,7 +31,7 @@ def map_axes(model: ResettableModel, title: str) -> tuple[Figure, Axes]:
 
 
 def draw_map(axes: Axes, model: ResettableModel) -> None:
-    """Draw the model's walls and goal into axes, at equal scale.
+    """Draw the model's walls and goal into axes: at equal scale, unless the two dimensions seem to have unlike units.
 
     Raises:
         Mismatch: the feature has fewer than two dimensions.
@@ -60,13 +62,18 @@ def draw_line(axes: Axes, points: Array, **style: Any) -> None:
 def legend_below(axes: Axes, *, columns: int = 4) -> None:
     """Put the legend under the picture, where it hides nothing."""
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.05), ncols=columns, frameon=False, fontsize=9)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=columns, frameon=False, fontsize=9)
 
 
 def _frame(axes: Axes, model: ResettableModel) -> None:
     low, high = model.feature_low[:2], model.feature_high[:2]
-    margin = 0.02 * float(np.max(high - low))
-    axes.set_xlim(low[0] - margin, high[0] + margin)
-    axes.set_ylim(low[1] - margin, high[1] + margin)
-    axes.set_aspect("equal")
+    extents = high - low
+    planar = len(model.walls) > 0 or model.goal_circle is not None
+    equal = planar or extents.max() <= ALIKE * extents.min()
+    margin = 0.02 * (np.full(2, extents.max()) if equal else extents)
+    axes.set_xlim(low[0] - margin[0], high[0] + margin[0])
+    axes.set_ylim(low[1] - margin[1], high[1] + margin[1])
+    axes.set_aspect("equal" if equal else "auto")
+    for name, label in zip(("x", "y"), ("x", "y") if planar else ("first feature", "second feature"), strict=True):
+        axes.set(**{f"{name}label": label})
     axes.tick_params(labelsize=8)

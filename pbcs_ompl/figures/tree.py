@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.figures.canvas import QUANTITIES, RED
-from pbcs_ompl.figures.maze import draw_line, legend_below, map_axes, project_2d
+from pbcs_ompl.figures.maze import GOAL, draw_line, legend_below, map_axes, project_2d
 
 MOST_EDGES = 100_000
 
@@ -47,6 +47,9 @@ def draw_tree(axes: Axes, model: ResettableModel, states: Array, parents: NDArra
     if path is not None:
         draw_line(axes, project_2d(model, path), color=RED, linewidth=1.6, zorder=4,
                   label=f"path, {len(path) - 1} steps")
+        if model.goal_circle is None:
+            axes.plot(*project_2d(model, path[-1:])[0], marker="*", markersize=11, color=GOAL, markeredgecolor="black",
+                      markeredgewidth=0.6, linestyle="none", zorder=5, label="its end")
     return lines, f"({len(drawn):,} of {len(edges):,} edges drawn)" if len(drawn) < len(edges) else ""
 
 

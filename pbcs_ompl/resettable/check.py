@@ -43,7 +43,14 @@ class Check:
 
 @dataclass(frozen=True)
 class ResetReport:
-    """The outcome of `check_resettable`."""
+    """The outcome of `check_resettable`.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> report = pbcs_ompl.check_resettable("pbcs/Toy1D-v0")
+        >>> report.ok
+        True
+    """
 
     env_id: str
     checks: tuple[Check, ...]
@@ -97,6 +104,12 @@ def check_resettable(env: str | EnvSpec | gymnasium.Env | ResettableModel, *,
 
     Raises:
         UnknownName, InvalidOption, MissingDependency: see `pbcs_ompl.make`.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> report = pbcs_ompl.check_resettable("pbcs/Toy1D-v0")
+        >>> [check.name for check in report.checks if not check.ok]
+        []
     """
     name = env if isinstance(env, str) else type(env).__name__
     try:

@@ -56,6 +56,14 @@ def make(env: str | EnvSpec | gymnasium.Env | ResettableModel, env_kwargs: dict[
             start seed for what is built already.
         MissingDependency: the environment needs a library that is not installed.
         NotResettable, UnsupportedSpace: see `adapt`.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> model = pbcs_ompl.make("pbcs/Maze-v0", {"size": 3})
+        >>> state = model.initial_state(seed=0)
+        >>> outcome = model.transition(state[None], model.action_high[None])
+        >>> bool((outcome.states[0] > state).all())
+        True
     """
     options = {**(env_kwargs or {}), **kwargs}
     rules = {"start_seed": start_seed, "reset_options": reset_options, "max_episode_steps": max_episode_steps}

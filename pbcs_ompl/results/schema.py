@@ -36,7 +36,7 @@ class PlanConfig(Budgets):
     planner_kwargs: Table
     seed: Count
     environment: EnvValues
-    improve: NotRequired[Positive | str]
+    improve: NotRequired[Count | str]
     versions: NotRequired[Versions]
 
 
@@ -105,7 +105,7 @@ class CompareConfig(Budgets):
     environments: list[EnvValues]
     seeds: list[Count]
     versions: Versions
-    improve: NotRequired[Positive | str]
+    improve: NotRequired[Count | str]
 
 
 class StudyConfig(TypedDict):

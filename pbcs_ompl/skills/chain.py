@@ -45,6 +45,12 @@ class SkillChain(TrainedController):
         time_limit: Steps after which an execution counts as failed.
         actions: The environment's action space.
         reset_seed: The seed of the reset that leads to the start; None where none is known to.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.train("pbcs/Maze-v0", method="pbcs", seed=0)
+        >>> type(result.chain).__name__, len(result.chain.skills) > 0
+        ('SkillChain', True)
     """
 
     kind = "skill chain"

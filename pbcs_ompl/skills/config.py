@@ -21,8 +21,9 @@ from pbcs_ompl.results.files import read_toml
 from pbcs_ompl.results.schema import check
 from pbcs_ompl.skills.agent_interface import Agent, AgentFactory, AgentSettingsValues, far_sighted, load_agent
 from pbcs_ompl.skills.method import TrainingMethod
-from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings
-from pbcs_ompl.skills.path_following.task import observes_feature
+from pbcs_ompl.skills.path_following.follow import Follow
+from pbcs_ompl.skills.path_following.settings import FollowSettings
+from pbcs_ompl.skills.path_following.shown_feature import observes_feature
 from pbcs_ompl.skills.pbcs import PBCS, PBCSSettings
 from pbcs_ompl.skills.settings import MethodSettings, PlannedSettings, flat_names, read_preset
 from pbcs_ompl.skills.single_policy import (

@@ -81,6 +81,13 @@ class DistillResult:
         seconds: Wall time of the rounds.
         seed: Root of all random streams.
         out: The folder; None when none was asked for.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.train("pbcs/Maze-v0", seed=0)
+        >>> distilled = pbcs_ompl.distill(result.chain, settings={"rounds": 1, "updates": 100})
+        >>> distilled.chain.num_policies
+        1
     """
 
     chain: SkillChain
@@ -137,6 +144,13 @@ def distill(teacher: TrainedController, *, settings: dict[str, Any] | None = Non
         InvalidOption: no such setting, or a value out of its range.
         NotVerified: no fresh environment can be made, or no reset leads to the teacher's start.
         RunFolderError: the folder exists, or cannot be written.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.train("pbcs/Maze-v0", seed=0)
+        >>> short = {"width": 64, "episodes": 100, "updates": 500}
+        >>> pbcs_ompl.distill(result.chain, settings=short).student_nominal.success_rate
+        1.0
     """
     chosen = DistillSettings().updated(settings or {})
     model = make(teacher.environment)

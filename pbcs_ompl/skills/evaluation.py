@@ -36,6 +36,13 @@ class Evaluation:
         steps_median: Median steps of the successful ones; None when there are none.
         epsilon: Fraction of random actions.
         endings: How many episodes ended for which reason: "goal", "terminated", "truncated", "time limit".
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.train("pbcs/Maze-v0", seed=0)
+        >>> clean = pbcs_ompl.evaluate(result.chain, episodes=5)
+        >>> clean.success_rate, clean.endings
+        (1.0, {'goal': 5})
     """
 
     success_rate: float
@@ -94,6 +101,12 @@ def evaluate(controller: TrainedController | Controller,
         NotVerified: no fresh environment can be made, or none starts where the chain does.
         UnknownName, UnsupportedSpace: the environment does not exist, or does not fit.
         CallbackFailed: the environment raised.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.train("pbcs/Maze-v0", seed=0)
+        >>> pbcs_ompl.evaluate(result.chain, episodes=20, epsilon=0.1).episodes
+        20
     """
     check_range("episodes", episodes, 1 <= episodes <= MOST_EPISODES, f"from 1 to {MOST_EPISODES}")
     check_range("epsilon", epsilon, 0 <= epsilon <= 1, "within [0, 1]")

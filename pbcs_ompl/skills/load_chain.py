@@ -21,5 +21,12 @@ def load_chain(folder: str | Path, *, trust: bool = False) -> TrainedController:
 
     Raises:
         DamagedFile: a file is missing, truncated, or of another version.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.train("pbcs/Maze-v0", seed=0, out="runs/maze")
+        >>> chain = pbcs_ompl.load_chain("runs/maze/chain")
+        >>> chain.controller().act(chain.start).shape
+        (2,)
     """
     return CHAINS[kind_in(Path(folder))].load(folder, trust=trust)

@@ -68,6 +68,12 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
         Mismatch: the trajectory belongs to another environment, or does not reach its goal.
         RunFolderError: the folder exists, is in use, or cannot be written.
         CallbackFailed: the environment raised, or returned NaN.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.train("pbcs/Maze-v0", seed=0)
+        >>> result.solved, result.robust.success_rate >= 0.95
+        (True, True)
     """
     model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options,
                  max_episode_steps=max_episode_steps)
@@ -104,6 +110,14 @@ def resume(folder: str | Path, *, max_transitions: int | None = None, trust: boo
         RunFolderError: there is nothing to resume, or another process uses the folder.
         DamagedFile: a file in the folder is damaged.
         UntrustedModule: the folder names a module, and is not trusted.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> begun = pbcs_ompl.train("pbcs/Maze-v0", seed=0, max_transitions=600, out="runs/maze")
+        >>> begun.solved
+        False
+        >>> pbcs_ompl.resume("runs/maze", max_transitions=100_000).solved
+        True
     """
     with RunFolder(folder, resume=True) as opened:
         if _has_ended(opened.path):

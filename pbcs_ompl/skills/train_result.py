@@ -30,6 +30,12 @@ class TrainResult:
         seconds: Wall time of planning and training.
         seed: Root of all random streams.
         out: The folder; None when none was asked for.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.train("pbcs/Maze-v0", seed=0)
+        >>> sorted(set(result.summary()) & {"plan_transitions", "solved", "train_transitions"})
+        ['plan_transitions', 'solved', 'train_transitions']
     """
 
     solved: bool

@@ -128,11 +128,11 @@ class Training:
         return found.trajectory, transitions, None
 
     @property
-    def _allowance(self) -> str | None:
+    def _allowance(self) -> str:
         """What making a plan shorter may use, for `plan`."""
         settings = self.config.settings
         share = settings.plan.improve if isinstance(settings, PlannedSettings) else 0.0
-        return f"{100 * share:g}%" if share else None
+        return f"{100 * share:g}%"
 
     def _keep_plan(self, trajectory: Trajectory, transitions: int) -> None:
         if self.path:

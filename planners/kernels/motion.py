@@ -20,6 +20,22 @@ def draw_control(bounds: Array, controls: Array, child: int, rng: np.random.Gene
         controls[child, axis] = bounds[0, axis] + (bounds[1, axis] - bounds[0, axis]) * rng.random()
 
 
+@njit()
+def to_surface(bounds: Array, controls: Array, row: int) -> None:
+    """Scale controls[row] to the surface of its bounds [2, A], as seen from their middle."""
+    largest = 0.0
+    for axis in range(bounds.shape[1]):
+        middle, half = (bounds[0, axis] + bounds[1, axis]) / 2.0, (bounds[1, axis] - bounds[0, axis]) / 2.0
+        if half > 0.0:
+            largest = max(largest, abs(controls[row, axis] - middle) / half)
+    if largest == 0.0:
+        return
+    for axis in range(bounds.shape[1]):
+        middle = (bounds[0, axis] + bounds[1, axis]) / 2.0
+        scaled = middle + (controls[row, axis] - middle) / largest
+        controls[row, axis] = min(max(scaled, bounds[0, axis]), bounds[1, axis])
+
+
 @njit(inline="always")
 def draw_duration(durations: tuple[int, int], rng: np.random.Generator) -> int:
     """Return how many steps a control lasts."""

@@ -186,15 +186,24 @@ def test_targets_of_ddpg_equal_eq_1_2(kind: type[StackedAgent]) -> None:
 
 
 def test_targets_of_td3_are_the_smaller_twin_at_a_smoothed_action() -> None:
-    agent, noise = trained_agent(TD3), 3.0 * randn(SEEDS, BATCH, 2)
+    agent, noise = trained_agent(TD3), randn(SEEDS, BATCH, 2)
     batch = batch_of(agent)
     for seed in range(SEEDS):
         actor = numpy_network(agent.actor, seed, True)
         twins = [numpy_network(agent.critic, index, True) for index in (seed, seed + SEEDS)]
         for state, value, index in next_values(batch, agent.smoothed_targets(batch, noise), seed):
-            disturbed = np.tanh(actor(state)) + np.clip(0.2 * noise[seed, index].double().numpy(), -0.5, 0.5)
+            disturbed = np.tanh(actor(state)) + noise[seed, index].double().numpy()
             expected = min(q(twin, state, np.clip(disturbed, -1.0, 1.0)) for twin in twins)
             assert value == pytest.approx(expected, rel=1e-3, abs=1e-4)
+
+
+def test_noise_on_the_actions_of_td3_is_clipped() -> None:
+    agent = trained_agent(TD3, target_noise=0.4)
+    noise = torch.as_tensor(agent.update_inputs(1, 200)[2])
+    assert noise.shape == (200, SEEDS, BATCH, 2)
+    normal = torch.erfinv(torch.linspace(-1.0, 1.0, 20_001)[1:-1]) * 2**0.5
+    assert noise.abs().max() == 0.5
+    assert float(noise.std()) == pytest.approx(float((0.4 * normal).clamp(-0.5, 0.5).std()), rel=0.02)
 
 
 def test_targets_of_sac_are_the_smaller_twin_and_the_entropy() -> None:

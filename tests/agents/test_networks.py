@@ -50,34 +50,37 @@ def test_outputs_and_gradients_equal_those_of_plain_torch(sizes: tuple[int, ...]
     torch.testing.assert_close(input_gradient(weights, activations, grad), by_inputs, rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.parametrize("layer_norm", [False, True])
 @pytest.mark.parametrize("sizes", [(3, 16, 8, 2), (4, 33, 40, 1)])
-def test_kernels_equal_torch_for_every_seed_of_a_stack(sizes: tuple[int, ...]) -> None:
-    network, batch, seeds = MLP(sizes), 13, 3
-    flat = network.initial(generators(1, 2, 3))
+def test_kernels_equal_torch_for_every_seed_of_a_stack(sizes: tuple[int, ...], layer_norm: bool) -> None:
+    network, shape, batch, seeds = MLP(sizes, layer_norm), kernels.shape_of(sizes, layer_norm), 13, 3
+    flat = network.initial(generators(1, 2, 3)) + 0.1 * torch.randn(3 * network.num_parameters)
     inputs, grad = torch.randn(seeds, batch, sizes[0]), torch.randn(seeds, batch, sizes[-1])
     weights, gradient = Weights(network, flat), Weights(network, torch.zeros_like(flat))
     outputs, activations = forward(weights, inputs)
     backward(weights, activations, grad, gradient)
     into_inputs = input_gradient(weights, activations, grad)
     for seed in range(seeds):
-        values = np.zeros(kernels.num_activations(sizes, batch), np.float32)
+        member, values = kernels.Member(seeds, seed), np.zeros(kernels.num_activations(shape, batch), np.float32)
         grads, own = np.zeros_like(values), np.zeros(network.num_parameters, np.float32)
         values[: batch * sizes[0]] = inputs[seed].numpy().ravel()
-        kernels.forward(sizes, flat.numpy(), seeds, seed, values, batch)
-        start = kernels.outputs_offset(sizes, batch)
-        np.testing.assert_allclose(values[start:], outputs[seed].numpy().ravel(), rtol=1e-5, atol=1e-5)
-        grads[start:] = grad[seed].numpy().ravel()
-        kernels.backward(sizes, flat.numpy(), seeds, seed, values, grads.copy(), batch, own)
-        kernels.backward(sizes, flat.numpy(), seeds, seed, values, grads, batch, np.empty(0, np.float32))
-        expected = [part[seed].numpy().ravel() for layer in gradient.layers for part in layer[:2]]
+        kernels.forward(shape, flat.numpy(), member, values, batch)
+        start = kernels.outputs_offset(shape, batch)
+        there = slice(start, start + batch * sizes[-1])
+        np.testing.assert_allclose(values[there], outputs[seed].numpy().ravel(), rtol=1e-5, atol=1e-5)
+        grads[there] = grad[seed].numpy().ravel()
+        kernels.backward(shape, flat.numpy(), member, values, grads.copy(), batch, own)
+        kernels.backward(shape, flat.numpy(), member, values, grads, batch, np.empty(0, np.float32))
+        expected = [part[seed].numpy().ravel() for layer in gradient.layers for part in layer.tensors()]
         np.testing.assert_allclose(own, np.concatenate(expected), rtol=1e-4, atol=1e-5)
         down = grads[: batch * sizes[0]]
         np.testing.assert_allclose(down, into_inputs[seed].numpy().ravel(), rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.parametrize("layer_norm", [False, True])
 @pytest.mark.parametrize("way", ["torch", "kernel"])
-def test_adam_and_target_equal_torch_optim(way: str) -> None:
-    net = TrainedNetwork(MLP((2, 9, 1)), generators(4, 5), CPU)
+def test_adam_and_target_equal_torch_optim(way: str, layer_norm: bool) -> None:
+    net = TrainedNetwork(MLP((2, 9, 1), layer_norm), generators(4, 5), CPU)
     leaf = net.weights.flat.clone().requires_grad_()
     target, optimiser = leaf.detach().clone(), torch.optim.Adam([leaf], lr=3e-3)
     rates = adam_rates(3e-3, range(1, 51), CPU)
@@ -97,10 +100,11 @@ def test_adam_and_target_equal_torch_optim(way: str) -> None:
 
 
 def step_with_kernel(net: TrainedNetwork, seed: int, rate: torch.Tensor) -> None:
-    sizes, weights = net.network.sizes, net.weights.flat.numpy()
-    own = torch.cat([part[seed].ravel() for layer in net.gradient.layers for part in layer[:2]]).numpy()
-    kernels.adam_step(sizes, weights, net.mean.numpy(), net.square.numpy(), 2, seed, own, rate.numpy())
-    kernels.polyak_update(sizes, weights, net.target.flat.numpy(), 2, seed, np.float32(0.1))
+    shape, member = kernels.shape_of(net.network.sizes, net.network.layer_norm), kernels.Member(2, seed)
+    weights = net.weights.flat.numpy()
+    own = torch.cat([part[seed].ravel() for layer in net.gradient.layers for part in layer.tensors()]).numpy()
+    kernels.adam_step(shape, weights, net.mean.numpy(), net.square.numpy(), member, own, rate.numpy())
+    kernels.polyak_update(shape, weights, net.target.flat.numpy(), member, np.float32(0.1))
 
 
 def test_a_stack_is_initialised_like_its_seeds_alone() -> None:

@@ -32,7 +32,7 @@ def test_bash_completes(tmp_path):
 
     assert completed("pbcs tr") == ["train"]
     assert completed("pbcs plan --planner-") == ["--planner-kwargs"]
-    assert completed("pbcs plan --planner Rid") == ["Rides"]
+    assert completed("pbcs plan --planner Rand") == ["RandomWalk"]
     assert completed("pbcs train --agent td") == ["td3"]
     assert completed("pbcs plan --env MountainCarC") == ["MountainCarContinuous-v0"]
     assert completed("pbcs export runs --to on") == ["onnx"]

@@ -50,6 +50,15 @@ def test_progress_without_a_terminal_is_a_line_now_and_then_with_rate_and_time_l
                      "plan: transitions 400, 16.7 transitions/s, at most 36 s left"]
 
 
+def test_what_was_there_at_once_counts_neither_for_the_rate_nor_for_the_time_left(capsys, monkeypatch):
+    clock = iter([0.0, 0.5, 20.5])
+    monkeypatch.setattr("pbcs_ompl.cli.terminal.time", SimpleNamespace(monotonic=lambda: next(clock)))
+    with ProgressDisplay("study", count="runs", budget=100) as display:
+        for count in (80, 82):
+            display({"runs": count})
+    assert capsys.readouterr().err == "study: runs 82, 0.0976 runs/s, at most 3 min 5 s left\n"
+
+
 TABLE = [{"planner": "Ex", "runs": "3/4", "median": 1234.5}, {"planner": "RRT", "runs": "0/4", "median": "-"}]
 
 

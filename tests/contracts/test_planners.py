@@ -58,7 +58,7 @@ def search(entry, seed, budget, **options):
             path = setup.getSolutionPath()
             states = np.array([[s[0], s[1]] for s in path.getStates()])
             controls = np.array([[c[0], c[1]] for c in path.getControls()]).reshape(-1, 2)
-            counter.budget = None
+            counter.count = 0  # as the check makes all steps again
             checked = path.check()
         return status.getStatus(), count, states, controls, checked
 

@@ -40,6 +40,13 @@ class Corridor(Plane):
     state_high = feature_high = np.ones(1)
 
 
+class PhasePlane(Plane):
+    """A position, and a speed that is far smaller; neither walls nor a disc to reach."""
+
+    feature_high = np.array([2.0, 0.1])
+    walls, goal_circle = np.zeros((0, 4)), None
+
+
 @pytest.fixture
 def walk():
     return np.cumsum(np.random.default_rng(0).uniform(0, 0.1, (30, 2)), axis=0)
@@ -123,3 +130,11 @@ def test_a_failed_write_leaves_nothing_and_says_why(tmp_path):
 def test_plane_takes_one_state_or_many(walk):
     assert np.array_equal(project_2d(Plane(), walk[3]), walk[3:4])
     assert np.array_equal(project_2d(Plane(), walk), walk)
+
+
+def test_dimensions_of_unlike_units_have_scales_of_their_own_and_a_path_an_end(walk):
+    parents = np.arange(len(walk)) - 1
+    plane, phases = (tree_figure(model, walk, parents, path=walk).axes[0] for model in (Plane(), PhasePlane()))
+    assert (plane.get_aspect(), phases.get_aspect()) == (1.0, "auto")
+    assert "its end" in phases.get_legend_handles_labels()[1]
+    assert "its end" not in plane.get_legend_handles_labels()[1], "the goal is drawn"

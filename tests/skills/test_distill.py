@@ -64,12 +64,13 @@ def test_a_followers_policies_become_one(tmp_path: Path) -> None:
     from pbcs_ompl.skills.path_following.chain import FollowChain
     from pbcs_ompl.skills.path_following.follower import LineView
     from pbcs_ompl.skills.path_following.line import Line
+    from pbcs_ompl.skills.path_following.shown_feature import ShownFeature
     from pbcs_ompl.skills.policy import ObservationTransform
 
     model = make("pbcs/Maze-v0", {"size": 2})
     line = Line.through(np.array([[5.0, 5.0], [15.0, 5.0], [15.0, 15.0], [5.0, 15.0]]), 0.5)
-    view = LineView(np.array([0, 1]), np.array([0.1, 0.1]), ObservationTransform(np.zeros(2), np.ones(2)),
-                    np.array([1.0, 2.0]), 2.0, 10)
+    view = LineView(ShownFeature.plain(np.array([0, 1])), np.array([0.1, 0.1]),
+                    ObservationTransform(np.zeros(2), np.ones(2)), np.array([1.0, 2.0]), 2.0, 10)
     weights = towards_the_line(5.0)
     layer = np.zeros((view.size, 2), np.float32)
     layer[2, 0] = layer[3, 1] = 5.0

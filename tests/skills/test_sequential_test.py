@@ -44,6 +44,19 @@ def test_more_successes_never_turn_an_acceptance_into_a_refusal() -> None:
         assert verdicts[0] < verdicts[-1] or trials == 1
 
 
+def test_where_failures_are_more_frequent_fewer_trials_suffice() -> None:
+    test, stressed = SequentialTest(accepted_rate=0.993), SequentialTest(accepted_rate=0.993).with_failures(3.0)
+    assert 1.0 - stressed.refused_rate == pytest.approx(3.0 * 0.06)
+    assert 1.0 - stressed.accepted_rate == pytest.approx(3.0 * 0.007)
+    assert test.with_failures(1.0).most_needed(0, 0) == test.most_needed(0, 0) == 54
+    assert (stressed.most_needed(0, 0), stressed.most_trials) == (17, 34)
+    rng = np.random.default_rng(2)
+    assert np.mean([decided(stressed, stressed.refused_rate, rng)[0] for _ in range(1000)]) <= 0.05 + 0.02
+    assert np.mean([decided(stressed, stressed.accepted_rate, rng)[0] for _ in range(1000)]) >= 0.95 - 0.02
+    with pytest.raises(InvalidOption, match="refused_rate"):
+        test.with_failures(20.0)
+
+
 def test_it_ends_with_the_most_trials() -> None:
     test = SequentialTest(refused_rate=0.93, accepted_rate=0.995, most_trials=50)
     assert all(test.verdict(successes, 50) is not None for successes in range(51))

@@ -52,13 +52,16 @@ def test_pbcs_solves_the_small_maze(tmp_path):
     assert json.loads((tmp_path / "run" / "result.json").read_text())["train_transitions"] == result.train_transitions
 
 
+def angle_squared(outcome):
+    return outcome.env.state[:1] ** 2
+
+
 def test_the_usual_method_is_path_following_where_the_feature_is_observed():
     assert usual_method("fast", make("pbcs/Maze-v0", MAZE)) == "follow"
     assert usual_method("thesis", make("pbcs/Maze-v0", MAZE)) == "pbcs"
-    pendulum = {"goal": "reward>-0.01"}
+    assert usual_method("fast", make("Pendulum-v1", goal="reward>-0.01")) == "follow"
     with pytest.warns(UserWarning, match="the method is pbcs"):
-        assert usual_method("fast", make("Pendulum-v1", **pendulum)) == "pbcs"
-    assert usual_method("fast", make("Pendulum-v1", **pendulum, feature="obs")) == "follow"
+        assert usual_method("fast", make("Pendulum-v1", goal="reward>-0.01", feature=angle_squared)) == "pbcs"
 
 
 @pytest.mark.slow

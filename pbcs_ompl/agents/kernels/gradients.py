@@ -12,9 +12,10 @@ import torch
 from torch import Tensor
 
 from pbcs_ompl.agents import losses
-from pbcs_ompl.agents.losses import LOG_STD, ActionBox, squashed_log_density
+from pbcs_ompl.agents.kernels.layer_norm import LAYER_NORM_EPSILON
+from pbcs_ompl.agents.kernels.sac import LOG_STD
+from pbcs_ompl.agents.losses import ActionBox, squashed_log_density
 from pbcs_ompl.agents.networks import Layer, Loss, Norm, TrainedNetwork, TrainedScalar, Weights
-from pbcs_ompl.agents.policy import LAYER_NORM_EPSILON
 
 
 class Activations(NamedTuple):

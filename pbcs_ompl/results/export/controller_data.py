@@ -17,6 +17,7 @@ from pbcs_ompl.skills.chain import SkillChain
 from pbcs_ompl.skills.observed_sets import ObservedBall, ObservedClassifier
 from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.path_following.shown_feature import NO_SINE
 from pbcs_ompl.skills.robots.follower import RobotFollower
 
 PROBES = 16
@@ -70,9 +71,13 @@ def _chain(chain: SkillChain) -> ControllerData:
 def _follower(chain: FollowChain) -> ControllerData:
     view, line = chain.view, chain.line
     size = len(view.normaliser.origin)
-    arrays = {"line": line.points, "entries": view.entries, "unit": view.unit, "origin": view.normaliser.origin,
+    arrays = {"line": line.points, "entries": view.shown.entries, "unit": view.unit, "origin": view.normaliser.origin,
               "scale": view.normaliser.scale, "firsts": np.array(chain.firsts),
               "distances": _points(view.distances, line.spacing), "pass_radius": np.array(line.pass_radius)}
+    if (view.shown.sines != NO_SINE).any():
+        arrays["sines"] = view.shown.sines
+    if line.periods is not None:
+        arrays["periods"] = line.periods
     words = {"kind": "follower", "memory": {"pointer": 0, "stalled": -1}, "patience": view.patience,
              "reach": _reach(view.window, line.spacing), "spacing": line.spacing, "time_limit": chain.time_limit,
              "reset_seed": chain.reset_seed}

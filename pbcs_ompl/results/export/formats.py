@@ -46,6 +46,12 @@ class Export:
         files: The files, or folders of data sets.
         episodes: How many episodes they hold; None for formats without.
         successes: In how many of them the goal was granted; None for formats without.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.train("pbcs/Maze-v0", seed=0, out="runs/maze")
+        >>> pbcs_ompl.export("runs/maze", to="csv", out="tables").out
+        'tables'
     """
 
     to: str
@@ -94,6 +100,12 @@ def export(folder: str | Path, to: str, *, out: str | Path, episodes: int = 10, 
         RunFolderError: `out` is not empty, or cannot be written.
         DamagedFile: a file in the folder is damaged.
         NotVerified: no fresh environment can be made, in which episodes are recorded.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.train("pbcs/Maze-v0", seed=0, out="runs/maze")
+        >>> pbcs_ompl.export("runs/maze", to="numpy", out="my_robot").to
+        'numpy'
     """
     if to not in FORMATS:
         raise UnknownName("format", to, FORMATS)

@@ -145,14 +145,61 @@ def _parts(graph: Graph, data: ControllerData, seen: str) -> str:
 
 def _follower(graph: Graph, data: ControllerData, seen: str, memory: dict[str, str], line: str) -> Step:
     arrays = data.arrays
-    places = graph("Div", graph.columns(seen, arrays["entries"]), arrays["unit"])
-    pointer, stalled = _advanced(graph, data, places, memory, line)
-    ahead = graph("Flatten", _ahead(graph, line, places, pointer, arrays["distances"]))
-    normal = graph("Div", graph("Sub", seen, arrays["origin"]), arrays["scale"])
+    places = graph("Div", _shown(graph, data, seen), arrays["unit"])
+    pointer, stalled = _advanced(graph, data, _unwound(graph, data, places, memory["pointer"], line), memory, line)
+    unwound = _unwound(graph, data, places, pointer, line)
+    ahead = graph("Flatten", _ahead(graph, line, unwound, pointer, arrays["distances"]))
+    moved = _moved(graph, data, seen, graph("Mul", graph("Sub", unwound, places), arrays["unit"]))
+    normal = graph("Div", graph("Sub", moved, arrays["origin"]), arrays["scale"])
     inputs = graph("Concat", normal, ahead, _share(graph, data, stalled), axis=-1)
     past = graph.cast(graph("GreaterOrEqual", graph("Unsqueeze", pointer, [1]), arrays["firsts"]), np.int64)
     chosen = graph("Sub", graph("ReduceSum", past, [-1], keepdims=0), 1)
     return inputs, chosen, {"pointer": pointer, "stalled": stalled}
+
+
+def _shown(graph: Graph, data: ControllerData, seen: str) -> str:
+    """Return the features [B, F] that observations show: entries, and angles by cosine and sine."""
+    entries, sines = data.arrays["entries"], data.arrays.get("sines")
+    if sines is None:
+        return graph.columns(seen, entries)
+    return graph("Concat", *(_angle(graph, graph.columns(seen, [entry]), graph.columns(seen, [sine]))
+                             if sine >= 0 else graph.columns(seen, [entry])
+                             for entry, sine in zip(entries, sines, strict=True)), axis=-1)
+
+
+def _angle(graph: Graph, x: str, y: str) -> str:
+    """Return the angles of vectors (x, y), in [-pi, pi]; ONNX has no arctan2.
+
+    The tangent of half of the angle is y / (r + x) where x >= 0, elsewhere (r - x) / y; infinite for y = 0.
+    """
+    length = graph("Sqrt", graph("Add", graph("Mul", x, x), graph("Mul", y, y)))
+    right = graph("GreaterOrEqual", x, 0.0)
+    ahead = graph("Div", y, graph("Max", graph("Add", length, x), np.finfo(np.float64).tiny))
+    behind = graph("Div", graph("Sub", length, x), graph("Abs", y))
+    half = graph.cast(graph("Atan", graph.cast(graph("Where", right, ahead, behind), np.float32)), np.float64)
+    sign = graph("Where", graph("And", graph("Less", x, 0.0), graph("Less", y, 0.0)), -2.0, 2.0)
+    return graph("Mul", half, sign)
+
+
+def _unwound(graph: Graph, data: ControllerData, places: str, pointer: str, line: str) -> str:
+    """Return places [B, F] moved by whole periods to where they are nearest to the points at pointers [B]."""
+    periods = data.arrays.get("periods")
+    if periods is None:
+        return places
+    away = graph("Sub", places, graph("Gather", line, pointer, axis=0))
+    turns = graph("Round", graph("Div", away, np.where(periods > 0.0, periods, np.inf)))
+    return graph("Sub", places, graph("Mul", turns, periods))
+
+
+def _moved(graph: Graph, data: ControllerData, seen: str, shifts: str) -> str:
+    """Return observations [B, O] of which the entries that are the feature are larger by `shifts` [B, F]."""
+    arrays = data.arrays
+    if "periods" not in arrays:
+        return seen
+    onto = np.zeros((len(arrays["entries"]), len(data.words["observation"])))
+    plain = np.flatnonzero(arrays["sines"] < 0) if "sines" in arrays else np.arange(len(onto))
+    onto[plain, arrays["entries"][plain]] = 1.0
+    return graph("Add", seen, graph("MatMul", shifts, onto))
 
 
 def _last(graph: Graph, line: str) -> str:
@@ -233,7 +280,7 @@ def _leading(graph: Graph, data: ControllerData, seen: str, far: str, before: st
 
 
 def _heading(graph: Graph, speeds: int, seen: str) -> tuple[str, str]:
-    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.FreeJoint` and `deploy.Fixed`."""
+    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.FreeJoint`."""
     if not speeds:
         zero = graph("Mul", graph.columns(seen, [0]), 0.0)
         return graph("Add", zero, 1.0), zero

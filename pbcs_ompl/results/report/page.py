@@ -26,6 +26,12 @@ class Report(NamedTuple):
     Attributes:
         page: The file.
         sections: What it shows of each folder.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.plan("pbcs/Maze-v0", seed=0, out="runs/plan")
+        >>> [one["kind"] for one in pbcs_ompl.write_report("runs").summary()["folders"]]
+        ['plan']
     """
 
     page: Path
@@ -53,6 +59,12 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Report:
     Raises:
         RunFolderError: no results in `folder`; or `out` is not a report, or cannot be written.
         DamagedFile: `folder` is a result folder with a damaged file. One among many is reported on the page.
+
+    Example:
+        >>> import pbcs_ompl
+        >>> result = pbcs_ompl.plan("pbcs/Maze-v0", seed=0, out="runs/plan")
+        >>> pbcs_ompl.write_report("runs").page.name
+        'report.html'
     """
     root = Path(folder)
     paths = find_folders(root)
@@ -60,7 +72,7 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Report:
     with write_errors(page):
         check_replaceable(page, GENERATOR, "pbcs report")
     templates = _templates()
-    shown = [_shown(path, root, number, templates, single) for number, path in enumerate(paths, start=1)]
+    shown = [_shown(path, root, page, number, templates, single) for number, path in enumerate(paths, start=1)]
     sections = [section for section, _ in shown]
     stream = templates.get_template("report.html").generate(
         sections=sections, texts=[text for _, text in shown], single=single, root=str(root), generator=GENERATOR,
@@ -69,12 +81,14 @@ def write_report(folder: str | Path, out: str | Path | None = None) -> Report:
     return Report(page, sections)
 
 
-def _shown(path: Path, root: Path, number: int, templates: Environment, single: bool) -> tuple[Section, str]:
+def _shown(path: Path, root: Path, page: Path, number: int, templates: Environment,
+           single: bool) -> tuple[Section, str]:
     """Return the section of a folder, and its text; whatever is wrong with one of many costs only its own section.
 
     Args:
         path: The folder.
         root: That of the report.
+        page: The report.
         number: Its place on the page, from 1.
         templates: Ours.
         single: Whether it is the only folder.
@@ -84,7 +98,7 @@ def _shown(path: Path, root: Path, number: int, templates: Environment, single: 
     """
     text = templates.get_template("section.html").module.section  # type: ignore[attr-defined]
     try:
-        section = make_section(path, root)
+        section = make_section(path, root, page)
         return section, text(section, number, single)
     except PbcsError as error:
         if single:

@@ -1,6 +1,7 @@
 """One result folder as a section of a report."""
 
 import base64
+import os
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
@@ -9,7 +10,7 @@ from PIL import Image
 
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.results.checksums import changed_files
-from pbcs_ompl.results.files import CONFIG, FIGURES, RUNS, read_bytes
+from pbcs_ompl.results.files import CONFIG, FIGURES, RUNS, VIEW, read_bytes
 from pbcs_ompl.results.folder import read_folder
 from pbcs_ompl.results.report.contents import Content, Table, read_content
 from pbcs_ompl.results.report.repeat import repeating, resuming, viewing
@@ -58,6 +59,7 @@ class Section:
         settings: Its config.toml.
         versions: The versions and machines that made it.
         repeat, resume, view: Commands; "" where there is none.
+        scene: The page that `view` made, as an address from the report; "" if it is not there.
     """
 
     name: str
@@ -69,10 +71,16 @@ class Section:
     repeat: str
     resume: str
     view: str
+    scene: str
 
 
-def make_section(path: Path, root: Path) -> Section:
-    """Read a result folder below `root`.
+def make_section(path: Path, root: Path, page: Path) -> Section:
+    """Read a result folder.
+
+    Args:
+        path: The folder.
+        root: The report's, `path` or a folder above it.
+        page: The report.
 
     Raises:
         DamagedFile: a file in it is damaged.
@@ -85,7 +93,13 @@ def make_section(path: Path, root: Path) -> Section:
     content = replace(content, failures=[*changed, *content.failures])
     return Section(_name(path, root), folder.kind, content, [read_figure(picture) for picture in pictures],
                    read_bytes(path / CONFIG).decode("utf-8"), _versions(folder.provenance), repeating(folder),
-                   resuming(folder), viewing(folder))
+                   resuming(folder), viewing(folder), _scene(path, page))
+
+
+def _scene(folder: Path, page: Path) -> str:
+    """Return where the page of `pbcs view` lies, if it is in its folder: a link, for a report runs no scripts."""
+    scene = folder / VIEW
+    return Path(os.path.relpath(scene, page.parent)).as_posix() if scene.is_file() and not scene.is_symlink() else ""
 
 
 def _check_inside(folder: Path, files: list[Path]) -> None:
@@ -103,7 +117,7 @@ def _check_inside(folder: Path, files: list[Path]) -> None:
 def damaged_section(path: Path, root: Path, reason: str) -> Section:
     """Return the section of a folder that cannot be read, among others that can."""
     content = Content("A folder that cannot be read", DAMAGED, False, [], failures=[(DAMAGED, reason)])
-    return Section(_name(path, root), DAMAGED, content, [], "", _versions([]), "", "", "")
+    return Section(_name(path, root), DAMAGED, content, [], "", _versions([]), "", "", "", "")
 
 
 def _name(path: Path, root: Path) -> str:

@@ -12,6 +12,7 @@ from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.skills.chain_files import ChainContent
 from pbcs_ompl.skills.path_following.follower import Follower, LineView
 from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.path_following.shown_feature import ShownFeature
 from pbcs_ompl.skills.path_following.task import FollowTask
 from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
 from pbcs_ompl.skills.trained_controller import TaskValues, TrainedController, actions_of
@@ -75,8 +76,10 @@ class FollowChain(TrainedController):
         """The line and what policies see as arrays, the pointers from which they act in the structure."""
         view = self.view
         arrays = {"points": self.line.points, "pass_radius": np.array(self.line.pass_radius),
-                  "entries": view.entries, "unit": view.unit, "origin": view.normaliser.origin,
-                  "scale": view.normaliser.scale, "distances": view.distances}
+                  "entries": view.shown.entries, "sines": view.shown.sines, "unit": view.unit,
+                  "origin": view.normaliser.origin, "scale": view.normaliser.scale, "distances": view.distances}
+        if self.line.periods is not None:
+            arrays["periods"] = self.line.periods
         structure = {"skills": [{"first": int(first)} for first in self.firsts], "spacing": self.line.spacing,
                      "window": view.window, "patience": view.patience}
         return ChainContent(structure, arrays, [SkillPolicy(policy, ObservationTransform.identity(view.size))
@@ -86,10 +89,14 @@ class FollowChain(TrainedController):
     def from_content(cls, content: ChainContent, task: TaskValues) -> "FollowChain":
         """Return the policies of `content` for a task."""
         structure, arrays, policies = content
-        view = LineView(arrays["entries"].astype(np.int64), arrays["unit"],
+        entries = arrays["entries"].astype(np.int64)
+        shown = ShownFeature(entries, arrays["sines"].astype(np.int64)) if "sines" in arrays else (
+            ShownFeature.plain(entries))  # of older files
+        view = LineView(shown, arrays["unit"],
                         ObservationTransform(arrays["origin"], arrays["scale"]), arrays["distances"],
                         structure["window"], structure["patience"])
         return cls(policies=tuple(policy.actor for policy in policies),
                    firsts=tuple(place["first"] for place in structure["skills"]),
-                   line=Line(arrays["points"], structure["spacing"], float(arrays.get("pass_radius", np.inf))),
+                   line=Line(arrays["points"], structure["spacing"], float(arrays.get("pass_radius", np.inf)),
+                             arrays.get("periods")),
                    view=view, **task)

@@ -1,80 +1,24 @@
 """Path following: one policy along the whole plan, and more only where one does not succeed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
+from math import exp
 from typing import NamedTuple
 
 import numpy as np
 
 from pbcs_ompl.agents.policy import Policy
-from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.follower import Progress, Relay
-from pbcs_ompl.skills.path_following.task import LOOKS, FollowTask, LineSettings, Position
+from pbcs_ompl.skills.path_following.settings import FollowSettings
+from pbcs_ompl.skills.path_following.task import FollowTask, Position
 from pbcs_ompl.skills.path_following.verdict import Trouble, Verdict, judged
-from pbcs_ompl.skills.sequential_test import SequentialTest
-from pbcs_ompl.skills.settings import AgentSpaces, PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
 
 SHORTEST_SESSION = 250
 """Transitions of a session along a short line."""
-
-
-@dataclass(frozen=True)
-class FollowSettings(PlannedSettings):
-    """Settings of the method "follow"; those of the groups `starts` and `plan`, but `improve`, have no meaning for it.
-
-    A step is worth progress_reward * (its progress, in steps) - effort_cost * (mean square of the action, in [-1, 1]),
-    and `episodes.success_reward` more where it reaches the end.
-
-    Attributes:
-        line: The plan as a line, and how policies see it.
-        gate: When a policy passes.
-        progress_reward: For the progress of a step (ours: with 1, the actor saturates and fewer mazes are solved).
-        effort_cost: For the largest action (ours: without it, actions saturate; with 0.3, mazes take a tenth fewer
-            transitions than with 0.1, but where large actions are needed all the time, effort costs what progress is
-            worth).
-        action_noise: Deviation of the noise on actions in training, actions in [-1, 1] (ours; 0.3 to 0.5 were equal).
-        start_fraction: Fraction of episodes that begin in the plan's first state, not anywhere on it (ours, not tuned).
-        retry_fraction: Fraction of them that begin where executions of the last refused test came to a stop (ours).
-        session_lengths: Transitions of a session between two tests, in hops of the plan without its loops (ours: a test
-            without noise costs about a tenth).
-        test_share: Transitions of a session, at least, for each of the test before it (ours: a test that refuses a
-            good policy is dear).
-        averaging: Fraction of the averaged policy that stays after an update of the agent; it is the average that is
-            tested and kept (ours: that of the agent's target networks; with 0, the last policy, tests fail more often).
-        attempts: Tests that a policy may fail before the line is split (ours; 6 and 10 were equal in mazes). Each time
-            that training begins again, its sessions are twice as long.
-        longest_horizon: Each time that training begins again, the agent's horizon 1 / (1 - discount) is twice as long,
-            up to this many times that of its settings (ours: with a short one, it does not learn to fly).
-    """
-
-    line: LineSettings = field(default_factory=LineSettings)
-    gate: SequentialTest = field(default_factory=SequentialTest)
-    progress_reward: float = 0.3
-    effort_cost: float = 0.1
-    action_noise: float = 0.3
-    start_fraction: float = 0.1
-    retry_fraction: float = 0.3
-    session_lengths: int = 10
-    test_share: float = 0.5
-    averaging: float = 0.995
-    attempts: int = 6
-    longest_horizon: float = 4.0
-
-    def _check_ranges(self) -> None:
-        self._check_positive("progress_reward")
-        self._check("at least 0", lambda value: value >= 0, "effort_cost", "action_noise", "test_share")
-        self._check_fractions("start_fraction", "retry_fraction", "averaging")
-        self._check("at least 1", lambda value: value >= 1, "longest_horizon")
-        self._check_counts("session_lengths", "attempts")
-
-    def agent_spaces(self, model: ResettableModel) -> AgentSpaces:
-        """Return what agents see, as `LineView` shows it, and do: controls scaled to [-1, 1]."""
-        ones = np.ones(len(model.action_low))
-        return AgentSpaces(model.observation_size + len(LOOKS) * len(model.feature_low) + 1, -ones, ones)
 
 
 class Member(NamedTuple):
@@ -114,12 +58,14 @@ class Follow:
     """Trains one policy to move along the plan, from states all along it, until it passes a sequential test.
 
     A test executes the policy from the start once without noise and, if that succeeds, with random actions until the
-    sequential test has an answer. Where the last such test found failures, executions begin shortly before them and end
-    shortly after them first: a policy that still fails there is refused for a fraction of the steps.
+    sequential test has an answer: under stress until training has begun again, later without. Where the last test
+    without stress found failures, executions begin shortly before them and end shortly after them first: a policy that
+    still fails there is refused for a fraction of the steps.
 
-    After `attempts` failed tests the line is split: the best policy is tried from where its failures ended. From the
-    first place where it passes it is kept to the end, and a new policy is trained up to there. Where it passes nowhere,
-    training begins again with new networks, longer sessions and a longer horizon.
+    After `attempts` failed tests the best policy is tested without stress. Where it fails, training begins again with
+    new networks, longer sessions and a longer horizon. From then on the line is split first: the best policy is tried
+    from where its failures ended. From the first place where it passes it is kept to the end, and a new policy is
+    trained up to there.
 
     Source: ours. Starts all along a demonstration are those of DeepMimic (Peng et al. 2018, "reference state
     initialization"); the split is the idea of [Matheron2020] chapter 7.
@@ -215,7 +161,8 @@ class Follow:
         progress = after.position.progress
         reached = after.success | (progress.pointers >= self.state.end)
         terminals = reached | after.terminated | (progress.stalled >= self.settings.line.patience)
-        rewards = (self.settings.progress_reward * after.gains - self.settings.effort_cost * (actions ** 2).mean(axis=1)
+        gains = after.gains - self.settings.stray_cost * after.strayed
+        rewards = (self.settings.progress_reward * gains - self.settings.effort_cost * (actions ** 2).mean(axis=1)
                    + trainer.settings.success_reward * reached)
         trainer.agent.add_transitions(inputs[None], actions[None], rewards[None], task.inputs(after.position)[None],
                                       terminals[None])
@@ -227,8 +174,12 @@ class Follow:
             self._steps[over] = 0
         before = trainer.updates
         trainer.train(len(actions))
-        self._average = self._average.blended(self._present(),
-                                              1.0 - self.settings.averaging ** (trainer.updates - before))
+        self._average = self._average.blended(self._present(), self._renewed(trainer.updates - before))
+
+    def _renewed(self, updates: int) -> float:
+        """Return the part of the averaged policy that some updates replace by the present one."""
+        memory = self.settings.averaging * self._session_transitions * self.trainer.settings.updates_per_transition
+        return 1.0 - exp(-updates / memory) if memory > 0.0 else 1.0
 
     def _explore(self, inputs: Array) -> Array:
         """Return actions [B, A] in [-1, 1]: the agent's with noise, a few of them random."""
@@ -260,7 +211,8 @@ class Follow:
     def _test(self) -> None:
         """Test the policy from the start; keep it if it passes, or if it is the best so far."""
         state, policy, before = self.state, self._average, self.trainer.counter.count
-        found = self._try(policy, 0)
+        stress = self.settings.stress if not state.rounds else 1.0
+        found = self._try(policy, 0, stress)
         if found.passed:
             self.members.insert(0, Member(0, policy))
             state.passed = True
@@ -271,19 +223,25 @@ class Follow:
             self.best, state.best_rate, state.best_blocked = policy, found.rate, found.blocked
         state.phase = "train"
         if state.tests >= self.settings.attempts:
-            state.phase, state.candidate = "split", self._beyond(state.best_blocked)
+            state.phase, state.candidate = "split", 0 if stress > 1.0 else self._beyond(state.best_blocked)
 
     def _split(self) -> None:
-        """Try the best policy from the candidate on; keep it from there, or move on to beyond its failures."""
+        """Try the best policy from the candidate on; keep it from there, or move on to beyond its failures.
+
+        Before training has begun again it is tried from the start only: sessions may just have been too short.
+        """
         state = self.state
-        if self.best is None or state.candidate >= min(state.end, int(self.task.pointers[-1])):
+        far = 0 if not state.rounds else min(state.end, int(self.task.pointers[-1])) - 1
+        if self.best is None or state.candidate > far:
             self.members = []
             self._begin_again(self.task.line.last + 1)
             return
         found = self._try(self.best, state.candidate)
         if found.passed:
             self.members.insert(0, Member(state.candidate, self.best))
-            self._begin_again(state.candidate)
+            state.passed = state.candidate == 0
+            if not state.passed:
+                self._begin_again(state.candidate)
         else:
             state.candidate = max(self._beyond(found.blocked), state.candidate + 1)
 
@@ -301,35 +259,40 @@ class Follow:
         """Return the pointer one window after another."""
         return pointer + self._window
 
-    def _try(self, policy: Policy, first: int) -> Verdict:
+    def _try(self, policy: Policy, first: int, stress: float = 1.0) -> Verdict:
         """Test a policy, and the finished ones after it, from a pointer on."""
-        found = self._verdict(policy, first)
+        found = self._verdict(policy, first, stress)
         self.trainer.latest |= {"start": self.task.place(first), "success_rate": max(0.0, found.rate)}
         return found
 
-    def _verdict(self, policy: Policy, first: int) -> Verdict:
-        """Execute it once without noise, then from where the last one failed, then from the pointer on with noise."""
+    def _verdict(self, policy: Policy, first: int, stress: float) -> Verdict:
+        """Execute it once without noise, then from where the last one failed, then from the pointer on with noise.
+
+        Under stress the first failures come so soon that those of the last policy are not tried before.
+        """
         relay = Relay([policy, *(member.policy for member in self.members)],
                       [0, *(member.first for member in self.members)])
         start, goal = self.task.at(np.array([self.task.place(first)])), np.array([self.task.line.last + 1])
         ends = self._failures(relay, start, goal, 0.0).ends
         if len(ends):
             return Verdict(False, 0.0, int(ends[0]))
-        if first == 0 and self._trouble is not None:
-            past, _ = self._executed(relay, self._trouble.before, self._trouble.ends + 2 * self._window)
+        if first == 0 and self._trouble is not None and stress == 1.0:
+            past, _ = self._executed(relay, self._trouble.before, self._trouble.ends + 2 * self._window, stress)
             if not past.passed:
                 return past._replace(rate=-1.0)
-        verdict, trouble = self._executed(relay, start, goal)
+        verdict, trouble = self._executed(relay, start, goal, stress)
         if first == 0 and not verdict.passed:
             self._trouble = trouble
         return verdict
 
-    def _executed(self, relay: Relay, starts: Position, until: IndexArray) -> tuple[Verdict, Trouble]:
+    def _executed(self, relay: Relay, starts: Position, until: IndexArray, stress: float) -> tuple[Verdict, Trouble]:
         """Return the verdict on noisy executions from starts [N] to pointers [N], in turn, and where they failed."""
-        def failures(chosen: IndexArray) -> Trouble:
-            return self._failures(relay, starts[chosen], until[chosen], self.trainer.settings.test_epsilon)
+        epsilon = min(1.0, stress * self.trainer.settings.test_epsilon)
 
-        return judged(self.settings.gate, len(until), failures)
+        def failures(chosen: IndexArray) -> Trouble:
+            return self._failures(relay, starts[chosen], until[chosen], epsilon)
+
+        return judged(self.settings.gate.with_failures(stress), len(until), failures)
 
     def _failures(self, relay: Relay, starts: Position, until: IndexArray, epsilon: float) -> Trouble:
         """Return where executions from some starts [N] fail; training begins there from now on."""

@@ -11,6 +11,7 @@ from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.resettable.actions import ActionMap, Actions
 from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.path_following.shown_feature import ShownFeature
 from pbcs_ompl.skills.policy import ObservationTransform
 from pbcs_ompl.skills.side_by_side import SideBySide
 
@@ -64,16 +65,19 @@ class LineView:
 
         (normaliser(o), line(pointer + distance_k) - f(o) for each k, min(stalled / patience, 1))
 
+    Angles count whole turns as the line does at the pointer (`Line.unwound`), in the observation too where they are an
+    entry of it: nothing that the policy sees jumps.
+
     Attributes:
-        entries: The entries of the observation that are the feature, in its order [F].
-        unit: The unit of lines along each feature dimension [F]: f(o) = o[entries] / unit.
+        shown: Where the feature stands in the observation.
+        unit: The unit of lines along each feature dimension [F]: f(o) = shown(o) / unit.
         normaliser: Of the observations.
         distances: How far the policy looks ahead along the line, lengths [K].
         window: The longest move of a pointer in a step, a length.
         patience: Steps without progress after which training gives up.
     """
 
-    entries: IndexArray
+    shown: ShownFeature
     unit: Array
     normaliser: ObservationTransform
     distances: Array
@@ -83,18 +87,35 @@ class LineView:
     @property
     def size(self) -> int:
         """Number I of inputs."""
-        return len(self.normaliser.origin) + len(self.distances) * len(self.entries) + 1
+        return len(self.normaliser.origin) + len(self.distances) * len(self.unit) + 1
 
     def features(self, observations: Array) -> Array:
         """Return the features [B, F], in the unit of lines, that observations [B, O] show."""
-        shown: Array = observations[:, self.entries] / self.unit
-        return shown
+        features: Array = self.shown(observations) / self.unit
+        return features
 
     def inputs(self, observations: Array, line: Line, progress: Progress) -> Array:
         """Return the inputs [B, I] of a policy."""
         ahead = line.ahead(self.features(observations), progress.pointers, self.distances)
-        return np.concatenate([self.normaliser(observations), ahead.reshape(len(observations), -1),
+        seen = observed_along(line, progress.pointers, self.shown, self.unit, observations)
+        return np.concatenate([self.normaliser(seen), ahead.reshape(len(observations), -1),
                                np.minimum(progress.stalled / self.patience, 1.0)[:, None]], axis=1)
+
+
+def observed_along(line: Line, pointers: IndexArray, shown: ShownFeature, unit: Array, observations: Array) -> Array:
+    """Return observations [B, O] whose angles count whole turns as a line does.
+
+    Args:
+        line: The line.
+        pointers: Where the executions are on it [B].
+        shown: Where the feature stands in the observation.
+        unit: The unit of the line along each feature dimension [F].
+        observations: [B, O].
+    """
+    if line.periods is None:
+        return observations
+    features = shown(observations) / unit
+    return shown.moved(observations, (line.unwound(features, pointers) - features) * unit)
 
 
 class Relay:

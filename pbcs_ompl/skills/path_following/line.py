@@ -20,20 +20,25 @@ class Line:
         spacing: Length of the line between neighbouring points.
         pass_radius: A pointer passes a point only within this distance of it, or while points come nearer. So what is
             on the other side of a wall does not draw a pointer past the end of the wall.
+        periods: The period of each dimension [F], 0 for none; None where none has one. Points count on after a whole
+            period, as an angle that turns further and further: what is near a point is so in whatever turn.
     """
 
     points: Array
     spacing: float
     pass_radius: float = np.inf
+    periods: Array | None = None
 
     @classmethod
-    def through(cls, corners: Array, spacing: float, pass_radius: float = np.inf) -> "Line":
+    def through(cls, corners: Array, spacing: float, pass_radius: float = np.inf,
+                periods: Array | None = None) -> "Line":
         """Return the line through some corners in order.
 
         Args:
-            corners: [N, F]; equal ones in a row count once.
+            corners: [N, F]; equal ones in a row count once. The line does not take a short way round by itself: see
+                `unwrapped`.
             spacing: Length between the points of the line, about: a whole number of them fits into the length.
-            pass_radius: See the attribute.
+            pass_radius, periods: See the attributes.
 
         Raises:
             InvalidOption: no corner, one that is not finite, or a spacing that is not greater than 0.
@@ -44,12 +49,12 @@ class Line:
             raise InvalidOption(f"spacing={spacing:g}; expected greater than 0")
         lengths = arc_lengths(corners)
         if lengths[-1] == 0.0:
-            return cls(corners[:1].copy(), spacing, pass_radius)
+            return cls(corners[:1].copy(), spacing, pass_radius, periods)
         kept = np.concatenate([[True], np.diff(lengths) > 0])
         count = max(1, round(float(lengths[-1]) / spacing))
         places = np.linspace(0.0, lengths[-1], count + 1)
         columns = [np.interp(places, lengths[kept], column) for column in corners[kept].T]
-        return cls(np.stack(columns, axis=1), float(lengths[-1]) / count, pass_radius)
+        return cls(np.stack(columns, axis=1), float(lengths[-1]) / count, pass_radius, periods)
 
     @property
     def last(self) -> int:
@@ -60,6 +65,12 @@ class Line:
     def length(self) -> float:
         """From the start to the end."""
         return self.spacing * self.last
+
+    def unwound(self, features: Array, pointers: IndexArray) -> Array:
+        """Return features [B, F] moved by whole periods to where they are nearest to the points at pointers [B]."""
+        if self.periods is None:
+            return features
+        return features - whole_periods(features - self.points[pointers], self.periods)
 
     def pointer_at(self, lengths: Array) -> IndexArray:
         """Return the pointers [B] of the points nearest to some lengths [B] from the start."""
@@ -78,7 +89,7 @@ class Line:
         """
         moves = np.arange(max(1, round(window / self.spacing)) + 1)
         candidates = np.minimum(pointers[:, None] + moves, self.last)
-        squares = ((self.points[candidates] - features[:, None]) ** 2).sum(axis=2)
+        squares = ((self.points[candidates] - self.unwound(features, pointers)[:, None]) ** 2).sum(axis=2)
         barred = (squares[:, 1:] > squares[:, :-1]) & (squares[:, 1:] > self.pass_radius ** 2)
         squares[:, 1:][np.logical_or.accumulate(barred, axis=1)] = np.inf
         return np.take_along_axis(candidates, squares.argmin(axis=1)[:, None], axis=1)[:, 0]
@@ -95,7 +106,19 @@ class Line:
         """
         places = np.minimum(pointers[:, None] + np.rint(np.asarray(distances) / self.spacing).astype(np.int64),
                             self.last)
-        return self.points[places] - features[:, None]
+        return self.points[places] - self.unwound(features, pointers)[:, None]
+
+
+def whole_periods(differences: Array, periods: Array) -> Array:
+    """Return what to take away from differences [..., F] to make them shortest: multiples of periods [F], 0 for none.
+    """
+    return periods * np.rint(differences / np.where(periods > 0.0, periods, np.inf))
+
+
+def unwrapped(features: Array, periods: Array) -> Array:
+    """Return features [N, F] that count on after a whole period [F]: each is nearest to the one before it."""
+    steps = np.diff(features, axis=0)
+    return np.concatenate([features[:1], features[1:] - np.cumsum(whole_periods(steps, periods), axis=0)])
 
 
 def arc_lengths(corners: Array) -> Array:
@@ -103,15 +126,22 @@ def arc_lengths(corners: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
 
 
-def erase_loops(features: Array, gap: Array | float) -> IndexArray:
+def erase_loops(features: Array, gap: Array | float, periods: Array | None = None) -> IndexArray:
     """Return the indices [M] of the path with the fewest hops along `features` [T+1, F]; see `fewest_hops`.
 
     Args:
         features: Those of a plan [T+1, F].
         gap: Longest hop along each feature dimension, [F] or one for all.
+        periods: The period of each dimension [F], 0 for none; None where none has one.
     """
-    return fewest_hops(len(features),
-                       lambda index: (np.abs(features[index + 1:] - features[index]) <= gap).all(axis=1))
+    def near(index: int) -> BoolArray:
+        hops = features[index + 1:] - features[index]
+        if periods is not None:
+            hops -= whole_periods(hops, periods)
+        close: BoolArray = (np.abs(hops) <= gap).all(axis=1)
+        return close
+
+    return fewest_hops(len(features), near)
 
 
 def fewest_hops(count: int, near: Callable[[int], BoolArray]) -> IndexArray:

@@ -6,13 +6,13 @@ from typing import Self
 
 import numpy as np
 
-from pbcs_ompl.core.callbacks import code_of_others
-from pbcs_ompl.core.errors import InvalidState, Mismatch
+from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray
 from pbcs_ompl.skills.episodes import with_random_actions
-from pbcs_ompl.skills.path_following.follower import LineView, Progress, Relay
-from pbcs_ompl.skills.path_following.line import Line, arc_lengths, erase_loops
+from pbcs_ompl.skills.path_following.follower import LineView, Progress, Relay, observed_along
+from pbcs_ompl.skills.path_following.line import Line, arc_lengths, erase_loops, unwrapped
+from pbcs_ompl.skills.path_following.shown_feature import ShownFeature
 from pbcs_ompl.skills.policy import ObservationTransform
 from pbcs_ompl.skills.settings import Settings
 
@@ -20,10 +20,6 @@ LOOKS = (1.0, 2.0, 4.0)
 """How far policies look ahead, in multiples of `LineSettings.look_ahead`."""
 STEP_QUANTILE = 0.9
 """Of the movements in a step along a plan, the one that is the unit: a blow against a wall is larger than a step."""
-WALK = 20
-"""Steps of the random walk that shows whether the feature is observed."""
-TOLERANCE = 1e-5
-"""Largest difference between a feature and the entry of the observation that shows it, relative to its size."""
 
 
 @dataclass(frozen=True)
@@ -85,12 +81,14 @@ class FollowStep:
     Attributes:
         position: Where they are now.
         gains: Progress along the line, in steps [B].
+        strayed: How much further from the line they are than before, in steps [B].
         success: Which reached the environment's goal [B].
         terminated, ended: Which episodes the environment terminated, and which it ended for whatever reason [B].
     """
 
     position: Position
     gains: Array
+    strayed: Array
     success: BoolArray
     terminated: BoolArray
     ended: BoolArray
@@ -145,21 +143,23 @@ class FollowTask:
         if len(early):
             raise InvalidState(f"state {early[0]} of the plan is in the goal, where the episode ends, but the plan has "
                                f"{len(states) - 1} steps; cut it off there")
-        observations = model.observe(states)
-        entries = feature_entries(model, states, observations)
-        features = observations[:, entries]
-        steps = np.quantile(np.abs(np.diff(features, axis=0)), STEP_QUANTILE, axis=0)
+        observations, periods = model.observe(states), model.feature_periods
+        shown = ShownFeature.of(model, states, observations)
+        features = shown(observations)
+        steps = np.quantile(np.abs(np.diff(unwrapped(features, periods), axis=0)), STEP_QUANTILE, axis=0)
         unit = np.where(steps > 0, steps, 1.0)
-        kept = erase_loops(features / unit, 1.0)
-        corners = features[kept] / unit
+        kept = erase_loops(features / unit, 1.0, periods / unit)
+        corners = unwrapped(features[kept], periods) / unit
         line = Line.through(extended(corners, settings.look_ahead * max(LOOKS)), settings.spacing,
-                            settings.pass_radius)
+                            settings.pass_radius, periods / unit if periods.any() else None)
         hop = np.searchsorted(kept, np.arange(len(states)), side="right") - 1
-        deviation = observations.std(axis=0)
-        normaliser = ObservationTransform(observations.mean(axis=0), np.where(deviation > 1e-9, deviation, 1.0))
-        view = LineView(entries, unit, normaliser, settings.look_ahead * np.array(LOOKS), settings.window,
+        pointers = line.pointer_at(arc_lengths(corners))[hop]
+        seen = observed_along(line, pointers, shown, unit, observations)
+        deviation = seen.std(axis=0)
+        normaliser = ObservationTransform(seen.mean(axis=0), np.where(deviation > 1e-9, deviation, 1.0))
+        view = LineView(shown, unit, normaliser, settings.look_ahead * np.array(LOOKS), settings.window,
                         settings.patience)
-        return cls(model, line, view, states, line.pointer_at(arc_lengths(corners))[hop], len(kept) - 1)
+        return cls(model, line, view, states, pointers, len(kept) - 1)
 
     def place(self, pointer: int) -> int:
         """Return the number of the first state of the plan that is at a pointer or beyond."""
@@ -180,8 +180,15 @@ class FollowTask:
         observations = self.model.observe(outcome.states)
         progress = position.progress.advanced(self.line, self.view.features(observations), self.view.window)
         gains = ((progress.pointers - position.progress.pointers) * self.line.spacing).astype(np.float64)
-        return FollowStep(Position(outcome.states, observations, progress), gains, outcome.success,
-                          outcome.terminated, outcome.ended)
+        after = Position(outcome.states, observations, progress)
+        return FollowStep(after, gains, self._away(after) - self._away(position), outcome.success, outcome.terminated,
+                          outcome.ended)
+
+    def _away(self, position: Position) -> Array:
+        """Return how far executions are from their places on the line, in steps [B]."""
+        features, here = self.view.features(position.observations), np.zeros(1)
+        lengths: Array = np.linalg.norm(self.line.ahead(features, position.progress.pointers, here)[:, 0], axis=1)
+        return lengths
 
     def execute(self, relay: Relay, position: Position, *, until: IndexArray, epsilon: float, max_steps: int,
                 patience: int, rng: np.random.Generator, counter: Counter) -> Tries:
@@ -247,47 +254,3 @@ def extended(corners: Array, length: float) -> Array:
     hop = corners[-1] - corners[-2]
     size = float(np.linalg.norm(hop))
     return np.concatenate([corners, (corners[-1] + hop * (length / size))[None]]) if size > 0 else corners
-
-
-def observes_feature(model: ResettableModel) -> bool:
-    """Return whether every dimension of the feature is an entry of the observation, in states of a short random walk.
-
-    Raises:
-        CallbackFailed: the environment raised.
-    """
-    rng = np.random.default_rng(0)
-    with code_of_others("the environment"):
-        states = [model.initial_state(0)]
-        for control in rng.uniform(model.action_low, model.action_high, (WALK, len(model.action_low))):
-            outcome = model.transition(states[-1][None], control[None])
-            states.append(model.initial_state(0) if outcome.ended[0] else outcome.states[0])
-        observations = model.observe(np.array(states))
-    try:
-        feature_entries(model, np.array(states), observations)
-    except Mismatch:
-        return False
-    return True
-
-
-def feature_entries(model: ResettableModel, states: Array, observations: Array) -> IndexArray:
-    """Return the entries of the observation that are the feature, in its order [F].
-
-    Args:
-        model: It knows features.
-        states: [N, D].
-        observations: Those of the states [N, O].
-
-    Raises:
-        Mismatch: a dimension of the feature is no entry of the observation.
-    """
-    entries = []
-    for dimension, values in enumerate(model.feature(states).T):
-        errors = np.abs(observations - values[:, None]).max(axis=0)
-        closest = int(errors.argmin())
-        if errors[closest] > TOLERANCE * max(1.0, float(np.abs(values).max())):
-            raise Mismatch(f"{model.spec.id}: dimension {dimension} of the feature is no entry of the observation, so "
-                           "a controller of observations cannot know where it is on the line; explore entries of the "
-                           f"observation (--feature 'obs[0:{observations.shape[1]}]'), or use another method than "
-                           "follow")
-        entries.append(closest)
-    return np.array(entries, dtype=np.int64)

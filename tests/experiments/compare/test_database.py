@@ -34,7 +34,7 @@ def records(sweep):
         record = {**failed_record(run, Failure("")), "solved": True, "transitions": 50 + number,
                   "collision_checks": 60 + number, "seconds": 0.5 * number, "nodes": 20, "path_length": 7,
                   "replay_ok": True, "memory": 100.5,
-                  "coverage": 0.25, "progress": {"transitions": [1, 50], "seconds": [1e-7, 0.5 * number],
+                  "coverage": 0.25, "progress": {"transitions": [1, 50 + number], "seconds": [1e-7, 0.5 * number],
                                                  "coverage": [0.125, 0.25]}, "reason": None}
         unsolved = {**record, "solved": False, "path_length": None, "replay_ok": None}
         died = failed_record(run, Failure("died"))
@@ -62,7 +62,7 @@ def test_columns_planner_arena_relies_on(database):
     assert columns(database, "experiments") == [*EXPERIMENTS, "transition_limit"]
     assert columns(database, "runs")[:3] == ["id", "experimentid", "plannerid"]
     assert columns(database, "runs")[-6:] == OURS
-    assert columns(database, "progress") == ["runid", "time", "transitions", "coverage"]
+    assert columns(database, "progress") == ["runid", "time", "transitions", "coverage", "best_cost"]
 
 
 def test_every_number_of_every_record_is_in_the_database(database, records):
@@ -84,6 +84,23 @@ def test_progress_belongs_to_its_run(database, records):
                 for sample in zip(*(record["progress"][name] for name in ("seconds", "transitions", "coverage")),
                                   strict=True)]
     assert sorted(database.execute(query).fetchall()) == sorted(expected)
+
+
+def test_costs_of_solutions_are_shown_over_time(sweep, records, tmp_path):
+    """The steps of the best plan so far, with those that were made after the search."""
+    longer, never = records[0], [record for record in records if not record["solved"]]
+    longer["improvement"] = {"before": 7, "after": 4, "transitions": 30, "seconds": 2.0, "progress": {
+        "transitions": [0, 10, 20], "seconds": [0.0, 0.25, 1.0], "length": [7, 6, 4]}}
+    write_database(tmp_path / "c.db", write_logs(tmp_path, sweep, records))
+    query = ("SELECT r.transitions, g.time, g.transitions, g.coverage, g.best_cost FROM progress g "
+             "JOIN runs r ON r.id = g.runid ORDER BY r.id, g.time")
+    with sqlite3.connect(tmp_path / "c.db") as database:
+        found = database.execute(query).fetchall()
+    assert [row[1:] for row in found if row[0] == longer["transitions"]] == [
+        (1e-7, 1, 0.125, None), (0.5, 51, 0.25, 7.0), (0.75, 61, None, 6.0), (1.5, 71, None, 4.0)]
+    unsolved = {record["transitions"] for record in never}
+    assert {row[4] for row in found if row[0] in unsolved} == {None}
+    assert {row[4] for row in found if row[0] not in unsolved} == {None, 7.0, 6.0, 4.0}
 
 
 def test_what_an_experiment_says(database, sweep):

@@ -3,6 +3,7 @@
 import json
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import psutil
@@ -11,6 +12,7 @@ import pytest
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.experiments.planning_run import MEASURED, failed_record, folder_of, is_record_of, run_planner
 from pbcs_ompl.experiments.run import Failure, Run
+from pbcs_ompl.results.schema import RunOfComparison, check
 
 RUN = Run("1-Maze-v0/Ex-3", {"planner": "Ex", "planner_kwargs": {}, "seed": 3, "max_transitions": 5000,
                              "max_seconds": None, "improve": None,
@@ -40,6 +42,17 @@ def test_progress_ends_with_the_run():
     curve = record["progress"]
     assert {len(values) for values in curve.values()} == {len(curve["transitions"])}
     assert [values[-1] for values in curve.values()] == [record["transitions"], record["seconds"], record["coverage"]]
+
+
+def test_a_planner_that_continues_records_its_first_solution_and_what_followed():
+    name = "pbcs_ompl.planners:SSTCompiled"
+    run = replace(changed(planner=name, max_transitions=9000), name="1-Maze-v0/SST-3")
+    record = run_planner(run)
+    note = record["improvement"]
+    assert is_record_of(run, record)
+    assert record["transitions"] + note["transitions"] == 9000 == record["progress"]["transitions"][-1]
+    assert record["path_length"] == note["after"] < note["before"]
+    check(Path("record"), record, RunOfComparison)
 
 
 def test_an_unsolved_run_says_why():

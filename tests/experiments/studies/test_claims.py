@@ -6,9 +6,9 @@ from scipy.stats import fisher_exact
 
 from pbcs_ompl.experiments import claims
 from pbcs_ompl.experiments.claims import (
+    APART,
     PAIRS,
     POWER,
-    WORTH,
     about,
     always,
     at_least,
@@ -44,16 +44,25 @@ def test_p_values_are_those_of_fishers_test():
         assert p == pytest.approx(fisher_exact(table, alternative="greater").pvalue, abs=1e-5)
 
 
-def test_the_fewest_runs_have_the_power_that_is_claimed():
-    """By simulation: with this number of runs, rates that are WORTH apart are separated in four cases of five."""
-    runs, rng = fewest_runs(WORTH), np.random.default_rng(0)
-    assert fewest_runs(0.2) > runs > fewest_runs(0.6)
-    one, other = (rng.binomial(runs, 0.5 + way * WORTH / 2, 2000) for way in (1, -1))
+@pytest.mark.parametrize("rates", [APART, (0.2, 0.02)])
+def test_the_fewest_runs_have_the_power_that_is_claimed(rates):
+    """By simulation: with this number of runs of each, the two rates are separated in four cases of five."""
+    runs, rng = fewest_runs(*rates), np.random.default_rng(0)
+    one, other = (rng.binomial(runs, chance, 1000) for chance in rates)
     shown = [higher("", rate(first, runs), rate(second, runs), NAMES, "").agrees for first, second in
-            zip(one.tolist(), other.tolist(), strict=True)]
+             zip(one.tolist(), other.tolist(), strict=True)]
     assert np.mean([verdict is True for verdict in shown]) == pytest.approx(
-        claims._power(runs, WORTH), abs=0.03)
-    assert claims._power(runs, WORTH) >= POWER > claims._power(runs - 3, WORTH)
+        claims._power((runs, runs), rates), abs=0.04)
+    assert claims._power((runs, runs), rates) >= POWER > claims._power((runs - 3, runs - 3), rates)
+
+
+def test_closer_rates_need_more_runs_and_rates_of_a_source_are_the_measure():
+    """0 of 25 beside 11 of 500 says nothing about 6 % against 1 %, though it would about 70 % against 30 %."""
+    assert fewest_runs(0.06, 0.01) > 100 > fewest_runs(*APART) > fewest_runs(0.8, 0.2)
+    few = higher("so", rate(0, 25), rate(11, 500), NAMES, "here", expected=(0.06, 0.01))
+    assert few.agrees is None
+    assert str(fewest_runs(0.06, 0.01)) in few.note
+    assert higher("so", rate(3, 300), rate(11, 500), NAMES, "here", expected=(0.06, 0.01)).agrees is False
 
 
 @pytest.mark.parametrize(("claim", "successes", "trials", "agrees"), [

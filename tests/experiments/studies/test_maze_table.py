@@ -79,7 +79,7 @@ def test_four_runs_without_success_do_not_show_that_there_is_none(verdicts):
 def test_pbcs_runs_first_and_then_the_others_in_balance():
     settings = STUDY.runs(STUDY.sweep, 20)
     labels = [one["label"] for one in settings]
-    assert len(settings) == 2 * (100 + 20 + 5 + 3) + 2 * (7 * 10 + 5 + 3) + 9 * 3
+    assert len(settings) == 2 * (100 + 20 + 5 + 3) + 2 * (7 * 10 + 5 + 3) + 9 * 3 + 4 * 10 + 5 + 3
     assert set(labels[:128]) == {"PBCS"}
     assert [(one["label"], one["size"]) for one in settings[128:164]] == [
         (label, size) for size in (*SIZES, 20, 30) for label in ("Follow", "PB", "DDPG", "TD3")]
@@ -95,3 +95,14 @@ def test_the_first_seed_is_drawn(label, tmp_path):
     STUDY.analyse([pictured], tmp_path)
     assert (tmp_path / "mazes.png").stat().st_size > 5000
     assert (tmp_path / "chains.png").is_file() == (label == "PBCS")
+
+
+def test_the_literal_algorithm_has_its_own_row_and_says_where_it_stops(verdicts):
+    runs = [run.settings for run in STUDY.all_runs()]
+    literal = [one for one in runs if one["label"] == analysis.LITERAL]
+    assert {one["preset"] for one in literal} == {"thesis"}
+    assert literal == runs[-len(literal):], "the runs that take long come last"
+    assert [sum(one["size"] == size for one in literal) for size in (5, 7, 10, 15)] == [10, 5, 3, 0]
+    stopped = record(analysis.LITERAL, 3, 0, False) | {"complete": False, "reason": "the budget is used up"}
+    claims = verdicts([stopped, record(analysis.LITERAL, 2, 0, True), record("PBCS", 3, 0, True)])
+    assert find(claims, "to the letter").numbers["where it stops"] == {"the budget is used up": 1}

@@ -167,6 +167,7 @@ def test_the_verb(folder, tmp_path, capsys, monkeypatch):
     assert (answer["id"], answer["runs"], answer["out"]) == ("coin-toss", 2, "runs/study-coin-toss-2")
     assert [claim["agrees"] for claim in answer["agrees"]] == [True, False]
     assert "DIFFERS   none are tails" in shown.err
+    assert shown.err.count("\n") < 10, "a claim takes one line"
     (folder / "coin-0").write_text("raise")
     assert main(["study", str(folder), "--seeds", "2"]) == 1
     assert main(["study"]) == 2

@@ -14,6 +14,7 @@ from pbcs_ompl.skills.observed_sets import Entry, ObservedBall, ObservedClassifi
 from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.follower import LineView
 from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.path_following.shown_feature import NO_SINE, ShownFeature
 from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
 from pbcs_ompl.skills.robots.follower import RobotFollower
 from pbcs_ompl.skills.robots.view import RobotView
@@ -61,12 +62,26 @@ def chain(actions: ActionMap, normed: bool = False) -> Case:
 def follow_chain() -> Case:
     rng = np.random.default_rng(1)
     line = Line.through(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]]), 0.5, pass_radius=2.0)
-    view = LineView(np.array([1, 0]), np.array([0.1, 0.1]), ObservationTransform(np.ones(2), np.full(2, 2.0)),
-                    np.array([1.0, 2.0, 4.0]), 2.0, 10)
+    view = LineView(ShownFeature.plain(np.array([1, 0])), np.array([0.1, 0.1]),
+                    ObservationTransform(np.ones(2), np.full(2, 2.0)), np.array([1.0, 2.0, 4.0]), 2.0, 10)
     policies = tuple(network(rng, view.size) for _ in range(3))
     walks = np.cumsum(rng.uniform(-0.02, 0.1, (20, 50, 2)), axis=0)
     return Case(FollowChain(policies, (0, 8, 20), line, view, np.zeros(2), MAZE, 200,
                             ActionMap(np.full(2, -0.1, np.float32), np.full(2, 0.1, np.float32), (2,)), 0), walks)
+
+
+def turning_chain() -> Case:
+    """A follower of a place, of an angle that is an entry, and of one that is shown by its cosine and sine."""
+    rng = np.random.default_rng(4)
+    turn = 2.0 * np.pi
+    line = Line.through(np.array([[0.0, 0.0, 0.0], [10.0, 60.0, -90.0], [30.0, 160.0, 0.0]]), 0.5, 2.0,
+                        np.array([0.0, turn, turn]) / 0.1)
+    view = LineView(ShownFeature(np.array([1, 0, 2]), np.array([NO_SINE, NO_SINE, 3])), np.full(3, 0.1),
+                    ObservationTransform(np.ones(4), np.full(4, 2.0)), np.array([1.0, 2.0, 4.0]), 4.0, 10)
+    corners = line.points[::5][:, None] * 0.1 + rng.normal(scale=0.05, size=(len(line.points[::5]), 50, 3))
+    x, one, other = np.moveaxis(corners[:20], 2, 0)
+    walks = np.stack([np.mod(one + np.pi, turn) - np.pi, x, np.cos(other), np.sin(other)], axis=2)
+    return Case(FollowChain((network(rng, view.size),), (0,), line, view, np.zeros(2), MAZE, 200, FLOAT64, 0), walks)
 
 
 def point_follower() -> Case:
@@ -91,7 +106,8 @@ def ant_follower() -> Case:
 FLOAT64 = ActionMap(np.full(2, -0.1), np.full(2, 0.1), (2,))
 CASES = {"chain": lambda: chain(FLOAT64), "chain of normalised layers": lambda: chain(FLOAT64, normed=True),
          "chain of integers": lambda: chain(ActionMap(np.array([-1, -2]), np.array([1, 3]), (2,))),
-         "follow chain": follow_chain, "point follower": point_follower, "ant": ant_follower}
+         "follow chain": follow_chain, "turning chain": turning_chain,
+         "point follower": point_follower, "ant": ant_follower}
 
 
 def actions_of(case: Case) -> np.ndarray:

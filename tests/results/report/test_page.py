@@ -174,3 +174,11 @@ def test_seeds_in_words(seeds, text):
 ])
 def test_numbers_in_words(value, text):
     assert format_value(value) == text
+
+
+def test_a_view_that_is_there_is_linked_and_not_embedded(copy, tmp_path):
+    (copy / "runs/plan/view.html").write_text("<script>alert(1)</script>")
+    assert "plan/view.html" in Page(write_report("runs").page).references
+    elsewhere = write_report("runs/plan", tmp_path / "elsewhere.html").page
+    assert "copy/runs/plan/view.html" in Page(elsewhere).references
+    assert "script" not in Page(elsewhere).tags

@@ -18,8 +18,10 @@ from pbcs_ompl.skills import load_chain, method_settings
 from pbcs_ompl.skills.agent_interface import load_agent
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
-from pbcs_ompl.skills.path_following.follow import Follow, FollowSettings
+from pbcs_ompl.skills.path_following.follow import Follow
 from pbcs_ompl.skills.path_following.follower import Progress, Relay
+from pbcs_ompl.skills.path_following.settings import FollowSettings
+from pbcs_ompl.skills.path_following.shown_feature import observes_feature
 from pbcs_ompl.skills.path_following.task import FollowTask, LineSettings, Position, around_last_progress, extended
 from pbcs_ompl.skills.path_following.verdict import Trouble, Verdict
 from pbcs_ompl.skills.trainer import SkillTrainer
@@ -89,8 +91,7 @@ def test_a_changed_follower_is_found_and_one_method_reads_not_the_other(folder: 
 
 
 def test_resuming_gives_the_same_bits(plan: Trajectory) -> None:
-    strict = FollowSettings().updated({"attempts": 2, "session_lengths": 1, "refused_rate": 0.999,
-                                       "accepted_rate": 0.9999})  # no policy passes
+    strict = FollowSettings().updated({"attempts": 2, "session_lengths": 1, "test_epsilon": 0.9})  # no policy passes
     whole, first, second = (method(plan.states, strict) for _ in range(3))
     for _ in range(5):
         whole.step()
@@ -128,10 +129,11 @@ def test_the_budget_binds_and_a_larger_one_continues(tmp_path: Path) -> None:
 def test_after_its_attempts_the_best_policy_is_kept_from_where_it_passes(plan: Trajectory,
                                                                          monkeypatch: pytest.MonkeyPatch) -> None:
     following = method(plan.states, FollowSettings().updated({"attempts": 2, "session_lengths": 1}))
+    following.state.rounds = 1
     passes_from = following.task.line.last // 2
     tried: list[int] = []
 
-    def verdict(self: Follow, policy: Any, first: int) -> Verdict:
+    def verdict(self: Follow, policy: Any, first: int, stress: float = 1.0) -> Verdict:
         tried.append(first)
         return Verdict(first >= passes_from, 0.5, first + 10)
 
@@ -147,7 +149,7 @@ def test_after_its_attempts_the_best_policy_is_kept_from_where_it_passes(plan: T
     restored = method(plan.states)
     restored.restore(following.snapshot())
     assert [member.first for member in restored.members] == [following.state.end]
-    monkeypatch.setattr(Follow, "_try", lambda self, policy, first: Verdict(True, 1.0, 0))
+    monkeypatch.setattr(Follow, "_try", lambda self, policy, first, stress: Verdict(True, 1.0, 0))
     while not following.done:
         following.step()
     chain = following.chain(100)
@@ -158,9 +160,9 @@ def test_after_its_attempts_the_best_policy_is_kept_from_where_it_passes(plan: T
 def test_a_policy_that_passes_nowhere_begins_again(plan: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
     following = method(plan.states, FollowSettings().updated({"attempts": 1, "session_lengths": 1}))
     last = following.task.line.last
-    monkeypatch.setattr(Follow, "_try", lambda self, policy, first: Verdict(False, 0.0, last))
+    monkeypatch.setattr(Follow, "_try", lambda self, policy, first, stress=1.0: Verdict(False, 0.0, last))
     agent = following.trainer.agent
-    for _ in range(3):
+    for _ in range(4):
         following.step()
     assert following.trainer.agent is not agent
     assert (following.members, following.state.end, following.state.tests) == ([], last + 1, 0)
@@ -203,14 +205,59 @@ def test_a_line_continues_in_the_direction_in_which_the_plan_ends() -> None:
     np.testing.assert_array_equal(extended(still, 4.0), still)
 
 
-def test_a_feature_that_is_not_observed_is_refused() -> None:
-    pendulum = make("Pendulum-v1")
+def test_what_policies_see_of_an_angle_does_not_jump() -> None:
+    """A car turns by nearly a whole turn: whether it counts turns or not, the line leads on, and the policy sees it."""
+    model = make("pbcs/CarPark-v0", {"obstacles": [], "start": [4.0, 4.0, 2.0]})
+    states = [model.initial_state(0)[None]]
+    for step in range(55):
+        states.append(model.transition(states[-1], np.array([[float(step < 4), 1.0]])).states)
+    plan = np.concatenate(states)
+    assert np.abs(np.diff(plan[:, 2])).max() > 6.0
+    task = FollowTask.of(model, plan, LineSettings())
+    seen = task.inputs(task.at(np.arange(len(plan))))
+    assert np.abs(np.diff(seen, axis=0))[5:].max() < 0.6
+    assert np.abs(seen[:, 6:-1]).max() < 10.0
+    turned = plan + 2.0 * np.pi * np.eye(4)[2]
+    position = task.at(np.arange(len(plan)))
+    other = Position(turned, model.observe(turned), position.progress)
+    np.testing.assert_allclose(task.inputs(other), task.inputs(position), atol=1e-9)
+    moved = task.line.advance(task.view.features(other.observations), position.progress.pointers, 4.0)
+    np.testing.assert_array_equal(
+        moved, task.line.advance(task.view.features(position.observations), position.progress.pointers, 4.0))
+
+
+def of_no_entry(outcome: Any) -> np.ndarray:
+    """The feature is the angle of a pendulum to the third power."""
+    return np.array([outcome.env.state[0] ** 3, outcome.env.state[1]])
+
+
+def swung(feature: Any = None) -> tuple[Any, np.ndarray]:
+    """A pendulum, and states of it under full torque."""
+    pendulum = make("Pendulum-v1", feature=feature)
     states = [pendulum.initial_state(0)[None]]
-    for _ in range(5):
+    for _ in range(60):
         states.append(pendulum.transition(states[-1], pendulum.action_high[None]).states)
+    return pendulum, np.concatenate(states)
+
+
+def test_a_feature_that_is_not_observed_is_refused() -> None:
+    pendulum, states = swung(of_no_entry)
+    assert not observes_feature(pendulum)
     with pytest.raises(Mismatch, match=r"Pendulum-v1: dimension 0 of the feature is no entry of the observation.*"
                                        r"--feature 'obs\[0:3\]'"):
-        FollowTask.of(pendulum, np.concatenate(states), LineSettings())
+        FollowTask.of(pendulum, states, LineSettings())
+
+
+def test_an_angle_is_observed_by_its_cosine_and_sine() -> None:
+    pendulum, states = swung()
+    assert observes_feature(pendulum)
+    task = FollowTask.of(pendulum, states, LineSettings())
+    away = task.view.shown(pendulum.observe(states)) - pendulum.feature(states)
+    np.testing.assert_allclose(np.sin(away), 0.0, atol=1e-5)
+    assert (np.cos(away) > 0).all()
+    position = task.at(np.arange(len(states)))
+    normal = task.view.normaliser
+    np.testing.assert_allclose(task.inputs(position)[:, :3], (position.observations - normal.origin) / normal.scale)
 
 
 def test_a_plan_through_a_terminal_state_is_refused(plan: Trajectory) -> None:
@@ -329,3 +376,29 @@ def test_a_session_takes_its_share_of_the_test_before(plan: Trajectory) -> None:
     shortest = following._session_transitions
     following.state.tested = 10 * shortest
     assert following._session_transitions == 5 * shortest
+
+
+def test_a_new_policy_is_tested_under_stress_and_after_its_attempts_the_best_one_without(
+        plan: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Executions fail where there is more noise than the criterion has."""
+    settings = method_settings("follow").updated({"attempts": 2, "stress": 3.0})
+    following, noise = method(plan.states, settings), list[float]()
+    usual = following.trainer.settings.test_epsilon
+
+    def failures(self: Follow, relay: Relay, starts: Position, until: np.ndarray, epsilon: float) -> Trouble:
+        noise.append(epsilon)
+        lost = np.flatnonzero(np.full(len(until), epsilon > usual))
+        return Trouble(starts[lost], starts.progress.pointers[lost])
+
+    monkeypatch.setattr(Follow, "_failures", failures)
+    monkeypatch.setattr(Follow, "_train_step", lambda self: None)
+    while not following.done:
+        following.step()
+    assert following.state.tests == 2
+    assert following.covered == 1.0
+    assert [member.first for member in following.members] == [0]
+    stressed = [epsilon > usual for epsilon in noise if epsilon > 0]
+    assert max(noise) == pytest.approx(3.0 * usual)
+    assert stressed.index(False) == sum(stressed) >= 2
+    with pytest.raises(InvalidOption, match="refused_rate"):
+        FollowSettings().updated({"stress": 20.0})

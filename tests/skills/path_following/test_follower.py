@@ -8,11 +8,12 @@ from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.skills.path_following.follower import Follower, LineView, Progress
 from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.path_following.shown_feature import ShownFeature
 from pbcs_ompl.skills.policy import ObservationTransform
 
 LOW, HIGH = np.full(2, -0.1), np.full(2, 0.1)
 LINE = Line.through(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]]), 0.5)
-VIEW = LineView(entries=np.array([2, 0]), unit=np.array([0.1, 0.1]),
+VIEW = LineView(shown=ShownFeature.plain(np.array([2, 0])), unit=np.array([0.1, 0.1]),
                 normaliser=ObservationTransform(np.array([1.0, 2.0, 3.0]), np.array([2.0, 2.0, 2.0])),
                 distances=np.array([1.0, 2.0]), window=2.0, patience=10)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbcs_ompl.core.errors import InvalidOption
-from pbcs_ompl.skills.path_following.line import Line, arc_lengths, erase_loops
+from pbcs_ompl.skills.path_following.line import Line, arc_lengths, erase_loops, unwrapped
 
 CORNERS = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]])
 
@@ -88,6 +88,26 @@ def test_points_ahead_are_relative_and_end_at_the_end(line: Line) -> None:
     np.testing.assert_allclose(seen[0, :2, 0], [0.0, 3 * line.spacing])
     np.testing.assert_allclose(seen[:, 2], CORNERS[-1] - here)
     np.testing.assert_allclose(seen[1, 1], CORNERS[-1] - here[1])
+
+
+def test_whole_periods_change_nothing() -> None:
+    """An angle of period 3 beside a place: the line turns twice, executions count their turns as they like."""
+    periods, rng = np.array([0.0, 3.0]), np.random.default_rng(3)
+    way = np.stack([np.linspace(0.0, 2.0, 41), np.linspace(0.0, 6.0, 41)], axis=1)
+    wrapped = way - [0.0, 3.0] * np.rint(way / [1.0, 3.0])
+    assert np.abs(np.diff(wrapped, axis=0)).max() > 2.0
+    np.testing.assert_allclose(unwrapped(wrapped, periods), way)
+    line = Line.through(way, 0.1, 0.5, periods)
+    pointers = rng.integers(0, line.last, 100)
+    here = line.points[pointers] + rng.uniform(-0.3, 0.3, (100, 2))
+    elsewhere = here + periods * rng.integers(-3, 4, (100, 1))
+    plain = replace(line, periods=None)
+    assert line.advance(elsewhere, pointers, 1.0).tolist() == plain.advance(here, pointers, 1.0).tolist()
+    ahead = line.ahead(elsewhere, pointers, np.array([0.0, 0.5]))
+    np.testing.assert_allclose(ahead, plain.ahead(here, pointers, np.array([0.0, 0.5])))
+    loop = np.array([[0.0, 0.0], [0.0, 1.0], [0.0, 2.0], [0.0, 3.05], [1.0, 3.05]])
+    assert erase_loops(loop, 0.1, periods).tolist() == [0, 3, 4]
+    assert erase_loops(loop, 0.1).tolist() == [0, 1, 2, 3, 4]
 
 
 def test_loops_are_erased() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.colors import LogNorm
 
 from pbcs_ompl.experiments.claims import Claim, Rate, at_least, at_most, greater, higher, no_higher, rate
+from pbcs_ompl.experiments.studies.backplay_2x2.study import OF_ALL_SEEDS
 from pbcs_ompl.figures.by_group import rates_figure
 from pbcs_ompl.figures.canvas import QUANTITIES, publish
 from pbcs_ompl.figures.maze import legend_below, map_axes
@@ -18,7 +19,8 @@ LOW, HIGH = 0.9, 0.99
 
 def analyse(records: Records, figures: Path) -> list[Claim]:
     """Draw the rates and the visits of DDPG alone; compare."""
-    trainings = [record for record in records if record["label"] != "alone"]
+    trainings = [record for record in records if record["label"] not in OF_ALL_SEEDS]
+    corrections = {record["discount"]: record for record in records if record["label"] == "correction"}
     alone = [record for record in records if record["label"] == "alone"]
     claims = []
     if trainings:
@@ -27,6 +29,8 @@ def analyse(records: Records, figures: Path) -> list[Claim]:
     for record in alone[-1:]:
         _draw_visits(record, figures)
         claims.append(_never_found(record))
+    if {LOW, HIGH} <= set(corrections):
+        claims.append(_slow_to_correct(*(corrections[discount] for discount in (HIGH, LOW))))
     return claims
 
 
@@ -73,9 +77,13 @@ def _variants(records: Records) -> list[Claim]:
     """Compare PB's starts, its pretest and the sliding window, from the sparse reward with the low discount."""
     pb, balls, untested, window = (_success_rate(records, label, discount=LOW) for label in (
         "PB", "PB, starts in balls", "PB without pretest", "sliding window"))
-    spent, without = ({record["seed"]: float(record["transitions"]) for record in records
-                       if (record["label"], record["reward"], record["discount"]) == (label, "sparse", LOW)}
-                      for label in ("PB", "PB without pretest"))
+    chosen = [{record["seed"]: record for record in records
+               if (record["label"], record["reward"], record["discount"]) == (label, "sparse", LOW)}
+              for label in ("PB", "PB without pretest")]
+    # Where both used up the budget, which of them is slower is not known.
+    known = {seed for one in chosen for seed, record in one.items() if record["succeeds"]}
+    spent, without = ({seed: float(record["transitions"]) for seed, record in one.items() if seed in known}
+                      for one in chosen)
     return [_more("starts in balls make PB succeed more often than exact ones", ("balls", balls), ("exact", pb),
                   "7.2.4"),
             _more("PB succeeds more often than the sliding window of Backplay", ("PB", pb), ("window", window), "5.2"),
@@ -89,6 +97,14 @@ def _never_found(record: dict[str, Any]) -> Claim:
     return at_most(f"DDPG alone meets no reward within {record['steps']:,} steps in most runs", "meet it", found, 0.5,
                    "[Matheron2020] 5.6, Fig. 5.4").with_numbers(
                        first_steps_with_reward=sorted(first[first > 0].tolist()))
+
+
+def _slow_to_correct(high: dict[str, Any], low: dict[str, Any]) -> Claim:
+    """Compare how many updates halve a value that is too high; those that were too few count as infinitely many."""
+    first, second = ({seed: float(updates) if updates > 0 else np.inf for seed, updates in
+                      zip(record["seeds"], record["halved"], strict=True)} for record in (high, low))
+    return greater(f"updates that halve the value of pushing against a wall: more with the discount {HIGH} than with "
+                   f"{LOW}", first, second, (f"{HIGH}", f"{LOW}"), "[Matheron2020] 5.5")
 
 
 def _draw_rates(records: Records, figures: Path) -> None:

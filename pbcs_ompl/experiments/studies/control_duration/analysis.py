@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.experiments.claims import Claim, always, greater, rate
+from pbcs_ompl.experiments.task_names import in_words
 from pbcs_ompl.figures.by_group import values_figure
 from pbcs_ompl.figures.canvas import publish
 
@@ -21,12 +22,12 @@ def analyse(records: Records, figures: Path) -> list[Claim]:
         for record in records:
             if record["planner"] == planner:
                 scenes.setdefault(record["scene"], []).append(record)
-        named = {scene: {str(duration): list(column.values()) for duration, column in _needed(chosen).items()}
+        named = {in_words(scene): {str(duration): list(column.values()) for duration, column in _needed(chosen).items()}
                  for scene, chosen in scenes.items()}
         publish(values_figure(named, xlabel="a control lasts 1 to this many steps", ylabel="transitions to the goal",
                            log=True, title=f"{planner}: control duration"), figures / f"transitions-{planner}.png")
         for scene, chosen in scenes.items():
-            claims += _fewer(planner, scene, chosen)
+            claims += _fewer(planner, in_words(scene), chosen)
     return claims
 
 

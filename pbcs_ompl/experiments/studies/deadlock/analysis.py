@@ -49,7 +49,7 @@ def _noises(variants: dict[str, Variant]) -> list[Claim]:
         return []
     return [higher("Ornstein-Uhlenbeck noise fails more often than epsilon-greedy noise", variants[OU].failures,
                    variants[GREEDY].failures, ("failures, Ornstein-Uhlenbeck", "failures, epsilon-greedy"),
-                   "[Matheron2020] Fig. 6.2(a)")]
+                   "[Matheron2020] Fig. 6.2(a)", expected=(EXPECTED_FAILURES[OU][0], EXPECTED_FAILURES[GREEDY][0]))]
 
 
 def _thesis_rates(variants: dict[str, Variant]) -> list[Claim]:

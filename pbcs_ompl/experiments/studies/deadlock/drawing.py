@@ -35,7 +35,8 @@ def draw_drift(drift: dict[str, Any], figures: Path) -> None:
     panels = {name: np.array(drift[key])[:, :DRIFTING]
               for name, key in (("max |Q|", "largest_value"), ("max |π|", "largest_action"))}
     updates = np.array(drift["updates"], dtype=np.float64)
-    publish(curves_figure(updates, panels, title="Drift: no reward at all (Fig. 6.4)"), figures / "drift.png")
+    publish(curves_figure(updates, panels, title="Drift: no reward at all (Fig. 6.4); the first of "
+                          f"{len(drift['largest_value'][0])} seeds"), figures / "drift.png")
 
 
 def draw(variants: dict[str, Variant], figures: Path) -> None:

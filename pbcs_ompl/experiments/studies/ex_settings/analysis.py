@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.experiments.claims import Claim, always, greater, rate
+from pbcs_ompl.experiments.task_names import in_words
 from pbcs_ompl.figures.by_group import values_figure
 from pbcs_ompl.figures.canvas import publish
 
@@ -23,7 +24,7 @@ def analyse(records: Records, figures: Path) -> list[Claim]:
     claims = [_all_solved(records)]
     for scene in scenes:
         chosen = [record for record in records if record["scene"] == scene]
-        claims += [*_bins(chosen, scene), *_batches(chosen, scene)]
+        claims += [*_bins(chosen, in_words(scene)), *_batches(chosen, in_words(scene))]
     return claims
 
 
@@ -32,7 +33,7 @@ def _all_solved(records: Records) -> Claim:
     worst: dict[str, int] = {}
     for record in records:
         if not record["solved"]:
-            name = f"{record['scene']}, {record['option']} {record['value']:g}"
+            name = f"{in_words(record['scene'])}, {record['option']} {record['value']:g}"
             worst[name] = worst.get(name, 0) + 1
     return always("Ex finds the goal within the budget with every value tried", "solved", solved,
                   OURS).with_numbers(failures=worst)
@@ -78,6 +79,7 @@ def _draw(records: Records, scenes: list[str], option: str, key: str, figures: P
     columns = {scene: {value: list(numbers.values()) for value, numbers in
                        _costs([record for record in records if record["scene"] == scene], option, key).items()}
                for scene in scenes}
-    named = {scene: {f"{value:g}": numbers for value, numbers in groups.items()} for scene, groups in columns.items()}
+    named = {in_words(scene): {f"{value:g}": numbers for value, numbers in groups.items()}
+             for scene, groups in columns.items()}
     publish(values_figure(named, xlabel=NAMES[option], ylabel=f"{key} to the goal", log=True,
                        title=f"Ex: {key} by {NAMES[option]}"), figures / f"{option.replace('_', '-')}-{key}.png")

@@ -8,18 +8,25 @@ from pbcs_ompl.resettable import make
 from pbcs_ompl.skills.trained_controller import TrainedController
 
 PICTURED_INDEX = 0
+THESIS = "thesis"
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
-    """One run for each seed, size and method: PBCS first, then the others seed by seed, so that a part is balanced."""
-    common = {"preset": sweep["preset"], "wall_penalty": sweep["wall_penalty"]}
-    chosen = [{"name": f"{name}-{size}-{index}", "label": name, "size": int(size), "index": index,
+    """One run for each seed, size and method, seed by seed: PBCS first, and last, to the letter; a part is balanced."""
+    chosen = [{"name": f"{name.replace(', ', '-')}-{size}-{index}", "label": name, "size": int(size), "index": index,
                "seed": sweep["first_seed"] + index, "method": method["method"], "agent": method["agent"],
-               "planner": method.get("planner"),
-               "max_transitions": method["max_transitions"], "episode_steps": options["episode_steps"], **common}
+               "planner": method.get("planner"), "preset": method.get("preset", sweep["preset"]),
+               "max_transitions": method["max_transitions"], "episode_steps": options["episode_steps"],
+               "wall_penalty": sweep["wall_penalty"]}
               for index in range(seeds) for size, options in sweep["sizes"].items()
-              for name, method in sweep["methods"].items() if index < min(method["seeds"], options["seeds"])]
-    return sorted(chosen, key=lambda settings: settings["method"] != "pbcs")
+              for name, method in sweep["methods"].items() if index < min(_seeds(method, size), options["seeds"])]
+    return sorted(chosen, key=lambda settings: (settings["preset"] == THESIS, settings["method"] != "pbcs"))
+
+
+def _seeds(method: dict[str, Any], size: str) -> int:
+    """Return how many seeds a method has in a size."""
+    most = method["seeds"]
+    return int(most.get(size, 0) if isinstance(most, dict) else most)
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from scipy.stats import binomtest
 from pbcs_ompl.core.statistics import median_interval
 from pbcs_ompl.experiments.claims import Claim, always, greater, rate
 from pbcs_ompl.experiments.studies.rides_ablation.study import WHOLE
+from pbcs_ompl.experiments.task_names import in_words
 from pbcs_ompl.figures.canvas import colour, new_panels, publish
 
 Records = list[dict[str, Any]]
@@ -86,7 +87,7 @@ def _draw(costs: Costs, figures: Path) -> None:
         if WHOLE in rules:
             axes.axvline(float(np.median(list(rules[WHOLE].values()))), color=colour(0), linewidth=0.8, linestyle=":")
         axes.set_yticks(range(len(names)), [name.replace("-", " ") for name in names])
-        axes.set(xscale="log", title=f"{scene} (N = {max(len(column) for column in rules.values())})")
+        axes.set(xscale="log", title=f"{in_words(scene)} (N = {max(len(column) for column in rules.values())})")
         axes.grid(alpha=0.3, axis="x")
     for axes in panels[len(costs):]:
         axes.set_axis_off()

@@ -7,7 +7,7 @@ import numpy as np
 
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.experiments.claims import Claim, about, rate
-from pbcs_ompl.figures.canvas import BAND, new_figure, publish
+from pbcs_ompl.figures.canvas import BAND, new_figure, publish, shade
 
 DEVIATIONS = 4.0
 """A simulation agrees when it is nowhere further off than this many standard deviations."""
@@ -86,8 +86,9 @@ def _agents(agents: dict[str, Any], greedy: dict[str, Any], figures: Path) -> li
 def _draw_densities(record: dict[str, Any], figures: Path) -> None:
     figure, axes = new_figure(7.2, 4.6)
     positions = np.linspace(-1.0, 8.0, 451) * 0.1
-    for step, density in record["pictures"].items():
-        axes.plot(positions, 10.0 * np.array(density), linewidth=1.5, label=f"{step} steps, exact")
+    for index, (step, density) in enumerate(record["pictures"].items()):
+        axes.plot(positions, 10.0 * np.array(density), linewidth=1.5, color=shade(index, len(record["pictures"])),
+                  label=f"{step} step{'s' * (step != '1')}, exact")
     counts = np.array(record["counts"])
     centres = (np.arange(-1.0, 8.0, 0.25) + 0.125) * 0.1
     axes.plot(centres, counts / counts.sum() / 0.025, ".", color="black",

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.ticker import NullFormatter
 
 from pbcs_ompl.core.statistics import median_interval
 from pbcs_ompl.core.types import Array
@@ -110,7 +111,9 @@ def _draw(neighbours: Records, growth: Records, figures: Path) -> None:
               1e6 * np.array([_per_expansion(record) for record in some]), NAMES.get(str(planner), str(planner)))
     right.set(xscale="log", yscale="log", xlabel="transitions", ylabel="microseconds of an expansion",
               title="What an expansion costs (3.3.2)")
-    for axes in (left, right):
+    for axes, ticks in ((left, sizes), (right, growth[0]["sizes"][1:])):
+        axes.set_xticks(ticks, [f"{int(tick):,}" for tick in ticks])
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.grid(alpha=0.3)
         axes.legend(frameon=False, fontsize=9)
     figure.suptitle("Medians and their 95 % bootstrap intervals", fontsize=9)

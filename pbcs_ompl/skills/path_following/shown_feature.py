@@ -1,0 +1,113 @@
+"""How an observation shows the feature: as entries, or an angle by its cosine and sine."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from pbcs_ompl.core.callbacks import code_of_others
+from pbcs_ompl.core.errors import Mismatch
+from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.types import Array, IndexArray
+
+WALK = 20
+"""Steps of the random walk that shows whether the feature is observed."""
+TOLERANCE = 1e-5
+"""Largest difference between a feature and what the observation shows of it, relative to its size."""
+NO_SINE = -1
+
+
+@dataclass(frozen=True, eq=False)
+class ShownFeature:
+    """Where in an observation each dimension of the feature stands.
+
+        f_k(o) = o[entries_k], and arctan2(o[sines_k], o[entries_k]) where there is a sine
+
+    Attributes:
+        entries: An entry for each dimension [F]; of an angle that is shown by cosine and sine, that of the cosine.
+        sines: The entries of the sines [F]; `NO_SINE` for what is no such angle.
+    """
+
+    entries: IndexArray
+    sines: IndexArray
+
+    @classmethod
+    def plain(cls, entries: IndexArray) -> Self:
+        """Return a feature that is entries of the observation [F]."""
+        return cls(entries, np.full(len(entries), NO_SINE))
+
+    @classmethod
+    def of(cls, model: ResettableModel, states: Array, observations: Array) -> Self:
+        """Return where the observation shows the feature.
+
+        Args:
+            model: It knows features, and the periods of angles.
+            states: [N, D].
+            observations: Those of the states [N, O].
+
+        Raises:
+            Mismatch: it does not show a dimension of the feature.
+        """
+        found = []
+        for dimension, values in enumerate(model.feature(states).T):
+            place = _place(values, observations, float(model.feature_periods[dimension]))
+            if place is None:
+                raise Mismatch(
+                    f"{model.spec.id}: dimension {dimension} of the feature is no entry of the observation, nor an "
+                    "angle whose cosine and sine are, so a controller of observations cannot know where it is on the "
+                    f"line; explore entries of the observation (--feature 'obs[0:{observations.shape[1]}]'), or use "
+                    "another method than follow")
+            found.append(place)
+        entries, sines = np.array(found, dtype=np.int64).T
+        return cls(entries, sines)
+
+    def __call__(self, observations: Array) -> Array:
+        """Return the features [B, F] that observations [B, O] show; angles shown by cosine and sine within a turn."""
+        shown: Array = observations[:, self.entries]
+        angles = self.sines != NO_SINE
+        shown[:, angles] = np.arctan2(observations[:, self.sines[angles]], shown[:, angles])
+        return shown
+
+    def moved(self, observations: Array, shifts: Array) -> Array:
+        """Return observations [B, O] of which the entries that are the feature are larger by `shifts` [B, F].
+
+        Cosines and sines stay as they are: shifts are whole turns.
+        """
+        plain, moved = self.sines == NO_SINE, observations.copy()
+        moved[:, self.entries[plain]] += shifts[:, plain]
+        return moved
+
+
+def _place(values: Array, observations: Array, period: float) -> tuple[int, int] | None:
+    """Return the entry that shows some values [N] in observations [N, O], or the cosine and the sine that do."""
+    tolerance = TOLERANCE * max(1.0, float(np.abs(values).max()))
+    errors = np.abs(observations - values[:, None]).max(axis=0)
+    if errors.min() <= tolerance:
+        return int(errors.argmin()), NO_SINE
+    cosine, sine = (int(np.abs(observations - shown[:, None]).max(axis=0).argmin())
+                    for shown in (np.cos(values), np.sin(values)))
+    away = np.arctan2(observations[:, sine], observations[:, cosine]) - values
+    if np.isclose(period, 2.0 * np.pi):
+        away -= period * np.rint(away / period)
+    lengths = np.hypot(observations[:, sine], observations[:, cosine])
+    return (cosine, sine) if max(np.abs(away).max(), np.abs(lengths - 1.0).max()) <= tolerance else None
+
+
+def observes_feature(model: ResettableModel) -> bool:
+    """Return whether observations show every dimension of the feature, in states of a short random walk.
+
+    Raises:
+        CallbackFailed: the environment raised.
+    """
+    rng = np.random.default_rng(0)
+    with code_of_others("the environment"):
+        states = [model.initial_state(0)]
+        for control in rng.uniform(model.action_low, model.action_high, (WALK, len(model.action_low))):
+            outcome = model.transition(states[-1][None], control[None])
+            states.append(model.initial_state(0) if outcome.ended[0] else outcome.states[0])
+        observations = model.observe(np.array(states))
+    try:
+        ShownFeature.of(model, np.array(states), observations)
+    except Mismatch:
+        return False
+    return True
