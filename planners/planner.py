@@ -28,8 +28,6 @@ from pbcs_ompl.planners.propagators import BatchPropagator, ModelPropagator
 ErrorType = TypeVar("ErrorType", bound=Exception)
 CHUNK = 2048
 """Steps of one compiled call, after which the termination condition is polled: about a millisecond."""
-FIRST_CHUNK = 256
-"""Steps of the first call: strategies make space for what they are asked for."""
 PLANNER_OPTIONS = {"batch": "grow", "control_duration": 1}
 """The options, with their defaults, that every planner has beside those of its strategy."""
 
@@ -301,8 +299,8 @@ class TreePlanner(ob.Planner):  # type: ignore[misc] # OMPL's classes have no ty
         """Expand a batch of nodes; return the node in the goal, or -1."""
         strategy, left, first = self._strategy, propagator.counter.left, len(tree)
         if self._compiled is not None and isinstance(propagator, ModelPropagator) and propagator.compiled is not None:
-            count = max(min(CHUNK, FIRST_CHUNK + first), self._durations[1])
-            return _expand_compiled(self._compiled, propagator, tree, propagator.compiled, min(count, left))
+            count = min(max(CHUNK, self._durations[1]), left)
+            return _expand_compiled(self._compiled, propagator, tree, propagator.compiled, count)
         count = self._batch or min(strategy.batch(tree), propagator.max_batch)
         nodes = _checked_nodes(strategy, tree, strategy.select(tree, min(count, left)), min(count, left))
         controls = _checked_controls(strategy, strategy.controls(tree, nodes), len(nodes))

@@ -64,7 +64,7 @@ class Rides(Strategy):
         self._yields = np.ones((QUESTIONS, max(self._scales, rides_loop.KINDS, rides_loop.PATIENCES), 3))
         self._rides = np.zeros((0, 10), np.int64)
         self._actions = np.empty((0, self._bounds.shape[1]))
-        self._riding = 0
+        self._riding = self._placed = 0
         self._limits = rides_loop.Limits(context.episode_steps)
 
     def resolved(self) -> dict[str, Any]:
@@ -82,6 +82,8 @@ class Rides(Strategy):
 
     def select(self, tree: Tree, count: int) -> IndexArray:
         """Return where the first `count` rides are; those that had ended begin again."""
+        if self._placed < len(tree):
+            self._place(tree)
         self._add_rides(count)
         rides_loop.begin(self.regions, self._yields, self._bounds, self._rides, self._actions, count, self.rng)
         self._riding = count
@@ -96,21 +98,30 @@ class Rides(Strategy):
         return np.full(len(nodes), self.context.control_durations[0])
 
     def inserted(self, tree: Tree, first: int, last: int) -> None:
-        """Put the new nodes into their bins, and end the rides that are over."""
-        self.regions = reserve(self.regions, last - first, last - first)
-        rides_loop.note(self.regions, self._yields, self._rides, self._riding, tree.columns, first, last, self._size,
-                          self._limits)
+        """Put the new nodes into their bins, and end the rides that are over; roots wait for what follows."""
+        if tree.parents[first] >= 0:
+            self._place(tree)
 
     def expand(self, tree: Tree, step: CompiledStep, feature_dims: IndexArray, count: int) -> int:
         """Ride for `count` steps in compiled code (see `pbcs_ompl.planners.compiled`)."""
+        roots, end = len(tree) - self._placed, len(tree) + count
         tree.reserve(count)
         self._add_rides(1)
-        self.regions = reserve(self.regions, count, 1)
+        self.regions = reserve(self.regions, roots + count, roots + 1)
         written, reached = rides_loop.explore(
-            step.parameters, feature_dims, self._bounds, tree.columns, len(tree), count, self.regions, self._size,
-            self._limits, self._yields, self._rides, self._actions, self.rng)
+            step.parameters, feature_dims, self._bounds, tree.columns, (self._placed, len(tree), end), self.regions,
+            self._size, self._limits, self._yields, self._rides, self._actions, self.rng)
         tree.claim(written)
+        self._placed = len(tree)
         return len(tree) - 1 if reached else -1
+
+    def _place(self, tree: Tree) -> None:
+        """Put the nodes that are in no bin yet into theirs."""
+        new = len(tree) - self._placed
+        self.regions = reserve(self.regions, new, new)
+        rides_loop.note(self.regions, self._yields, self._rides, self._riding, tree.columns, self._placed, len(tree),
+                        self._size, self._limits)
+        self._placed = len(tree)
 
     def _add_rides(self, count: int) -> None:
         missing = count - len(self._rides)

@@ -144,9 +144,10 @@ class Tree:
 
     def path_to(self, node: int) -> IndexArray:
         """Return the nodes from a root to `node`, both included."""
-        parent_of, path = self.columns.parents.item, [int(node)]
-        while (parent := parent_of(path[-1])) >= 0:
-            path.append(parent)
+        parents, path, node = self.columns.parents.data, [], int(node)
+        while node >= 0:
+            path.append(node)
+            node = parents[node]
         return np.array(path[::-1], dtype=np.int64)
 
     def __getstate__(self) -> dict[str, Any]:

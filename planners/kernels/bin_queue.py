@@ -160,9 +160,13 @@ def add(pool: Members, heads: Heads, runs: Runs, totals: NDArray[np.int64], numb
     return True
 
 
-@njit()
+@njit(inline="always")
 def grow_and_add(queue: BinQueue, cell: NDArray[np.int64], place: Number, node: Number) -> None:
-    """Add a node where `add` could not: open its bin, or double it."""
+    """Add a node where `add` could not: open its bin, or double it.
+
+    Inlined: every third node or so comes here, and to hand over the arrays of a queue costs as much as a step of a
+    point.
+    """
     pool, heads, free, used = queue.pool, queue.heads, queue.free, queue.used
     number: Number = np.int64(queue.table[place]) - 1
     if number < 0:
@@ -187,7 +191,7 @@ def _insert(queue: BinQueue, features: NDArray[np.float64], skip: NDArray[np.boo
                 grow_and_add(queue, cell, place, first + row)
 
 
-@njit()
+@njit(inline="always")
 def _new_bin(queue: BinQueue, cell: NDArray[np.int64], place: Number) -> Number:
     """Open a bin at a place of the hash table."""
     number: Number = np.int64(queue.head[0].length)

@@ -192,20 +192,22 @@ def note(regions: Regions, yields: Array, rides: IndexArray, count: int, columns
 
 
 @njit(types.Tuple((types.int64, types.boolean))(
-    PARAMETERS_TYPE, _integers, _matrix, COLUMNS_TYPE, types.int64, types.int64, REGIONS_TYPE, _vector,
+    PARAMETERS_TYPE, _integers, _matrix, COLUMNS_TYPE, types.UniTuple(types.int64, 3), REGIONS_TYPE, _vector,
     LIMITS_TYPE, types.float64[:, :, ::1], types.int64[:, ::1], _matrix, npy_rng), error_model="numpy")
 def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: IndexArray, bounds: Array,
-            columns: Columns, first: int, most: int, regions: Regions, bin_size: Array, limits: Limits, yields: Array,
-            rides: IndexArray, actions: Array, rng: np.random.Generator) -> tuple[int, bool]:
-    """Ride, one ride after the other, for `most` steps, or until there is no space to open a bin.
+            columns: Columns, span: tuple[int, int, int], regions: Regions, bin_size: Array, limits: Limits,
+            yields: Array, rides: IndexArray, actions: Array, rng: np.random.Generator) -> tuple[int, bool]:
+    """Ride, one ride after the other, for as many steps as there is space, or until there is none to open a bin.
 
     Args:
         parameters: See `pbcs_ompl.planners.compiled.CompiledStep`.
         feature_dims: Dimensions of the state that are the feature [F].
         bounds: Lower and upper bounds of the controls [2, A].
-        columns, first: The tree's arrays, with space for `most` more nodes, and the number of nodes so far.
-        most: How many steps.
-        regions, bin_size: The regions, with space for `most` more nodes and a bin, and the edges of the bins [F].
+        columns: The tree's arrays.
+        span: The first node that is in no bin yet, the first that is not written yet, and one behind the last that may
+            be. Those that are written are roots; to put them into their bins here saves the compilation of `note`.
+        regions, bin_size: The regions, with space for all these nodes, for the bins of the roots and one more, and the
+            edges of the bins [F].
         limits: What ends a ride.
         yields: Bins opened and steps used so far, and the weight [3, answers, 3], by scale, kind and patience.
         rides, actions: The first row of each is the ride in progress, and its control.
@@ -220,20 +222,23 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
     regions, yields, rides, actions = uncounted(regions), uncounted(yields), uncounted(rides), uncounted(actions)
     bounds, bin_size, feature_dims = uncounted(bounds), uncounted(bin_size), uncounted(feature_dims)
     rows, cells, places, order, runs, tails, totals, pool, free, used, cell, turns = regions
-    for child in range(first, first + most):
+    known, first, end = span
+    for child in range(known, end):
         if totals[REGIONS] + len(order) > len(rows):
             return child - first, False
-        if rides[0, ACTIVE] == 0:
-            _begin(rows, order, runs, tails, totals, pool, yields, bounds, rides, actions, 0, rng)
-        node = rides[0, NODE]
-        for axis in range(bounds.shape[1]):
-            controls[child, axis] = actions[0, axis]
-        reward, terminal, success = call_step(address, reals, table, integers, states, node, controls, child)
-        for axis in range(len(feature_dims)):
-            features[child, axis] = states[child, feature_dims[axis]]
-        parents[child], rewards[child], ends[child] = node, reward, terminal
-        if not finite(states, child):
-            return child + 1 - first, False
+        terminal, success = ends[child], False
+        if child >= first:
+            if rides[0, ACTIVE] == 0:
+                _begin(rows, order, runs, tails, totals, pool, yields, bounds, rides, actions, 0, rng)
+            node = rides[0, NODE]
+            for axis in range(bounds.shape[1]):
+                controls[child, axis] = actions[0, axis]
+            reward, terminal, success = call_step(address, reals, table, integers, states, node, controls, child)
+            for axis in range(len(feature_dims)):
+                features[child, axis] = states[child, feature_dims[axis]]
+            parents[child], rewards[child], ends[child] = node, reward, terminal
+            if not finite(states, child):
+                return child + 1 - first, False
         number, opened = NO_BIN, False
         if not terminal:
             cell_of(features, child, bin_size, turns, cell)
@@ -242,7 +247,8 @@ def explore(parameters: tuple[int, Array, Array, IndexArray], feature_dims: Inde
             if number < 0:
                 number, opened = open_bin(regions, cell), True
             add_node(rows, pool, free, used, number, child)
-        _note(rides, 0, yields, states, child, number, opened, terminal, limits)
+        if child >= first:
+            _note(rides, 0, yields, states, child, number, opened, terminal, limits)
         if success:
             return child + 1 - first, True
-    return most, False
+    return end - first, False

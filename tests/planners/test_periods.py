@@ -57,6 +57,7 @@ def test_an_angle_that_turns_is_not_new_for_ever(kind):
     angles = np.linspace(0.0, 50 * TURN, 500)
     tree.append(np.column_stack([angles, np.zeros(500)]), -1, 0.0, 0.0, False)
     strategy.inserted(tree, 0, 500)
+    strategy.select(tree, 1)
     bins = {Ex: lambda: strategy.queue.num_bins,
             Rides: lambda: int((strategy.regions.cells[:strategy.regions.totals[REGIONS], 2] == 0).sum())}
     assert bins.get(kind, lambda: int(strategy._grid.totals[0]))() == 6

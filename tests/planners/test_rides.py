@@ -11,6 +11,7 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.planners import Rides
+from pbcs_ompl.planners.kernels import rides_loop
 from pbcs_ompl.planners.kernels.ranking import REGIONS
 from pbcs_ompl.planners.kernels.regions import no_regions, open_bin, reserve
 from pbcs_ompl.planners.rides_without import PARTS, RidesWithout
@@ -149,6 +150,26 @@ def test_budget_and_second_solve_go_on_with_the_same_tree(solve, compiled_square
         counter.budget = budget
         parts.solve(ob.PlannerTerminationCondition(lambda: False))
     assert np.array_equal(parts.tree.states, whole.tree.states)
+
+
+def test_a_compiled_search_places_its_start_states_itself(solve, square, compiled_square, monkeypatch):
+    """Also those that come between two solves; the kernels of the other way, which take long to compile, stay out."""
+    trees = []
+    for world in (square, compiled_square):
+        planner, _, counter, setup = solve(lambda si: Rides.build(si, seed=4), world(goal=99.0, extent=30.0), 700)
+        start = setup.getSpaceInformation().allocState()
+        start[0], start[1] = 22.0, 19.0
+        setup.getProblemDefinition().addStartState(start)
+        counter.budget = 1500
+        planner.solve(ob.PlannerTerminationCondition(lambda: False))
+        assert planner.error is None
+        trees.append(planner.tree)
+        for name in ("begin", "note"):
+            monkeypatch.setattr(rides_loop, name, None)
+    by_hand, compiled = trees
+    assert by_hand.parents.tolist().index(-1, 1) in by_hand.parents
+    assert np.array_equal(compiled.parents, by_hand.parents)
+    assert np.array_equal(compiled.states, by_hand.states)
 
 
 def test_it_needs_fewer_transitions_than_ex():

@@ -21,8 +21,8 @@ class FollowSettings(PlannedSettings):
         line: The plan as a line, and how policies see it.
         gate: When a policy passes.
         stress: A new policy is tested with this many times the random actions of `test_epsilon`, and passes at as many
-            times the failure rates of `gate` (ours). Failures follow random actions: with more of them there are more,
-            at least in proportion, and fewer executions show what a policy is worth. 1 for no stress.
+            times the failure rates of `gate` (ours). With more random actions there are more failures, about in
+            proportion, and fewer executions show what a policy is worth. 1 for no stress.
         progress_reward: For the progress of a step (ours: with 1, the actor saturates and fewer mazes are solved).
         stray_cost: For the distance to the line (ours; with 0, policies move along the line beside it: a quadrotor at
             the speed of its plan in another place. With 1, policies pass after fewer sessions in mazes, too).
