@@ -1,4 +1,4 @@
-"""What the tasks of sweeps are called on figures and in claims."""
+"""What the tasks and variants of sweeps are called on figures and in claims."""
 
 import re
 

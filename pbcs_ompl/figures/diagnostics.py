@@ -9,6 +9,8 @@ from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.figures.canvas import BAND, QUANTITIES, RED, colour, new_panels
 
+FEW = 4
+"""More curves have their legend below, where it hides none of them."""
 HALF = 0.5
 """Where all rates but the first are above this one, the scale begins here."""
 ENLARGED, SMALLEST_SPAN = 0.02, 1e-3
@@ -42,7 +44,9 @@ def success_figure(panels: Mapping[str, Curves], *, title: str = "", xlabel: str
         axes.set_title(words, fontsize=10)
         axes.grid(alpha=0.3)
         if curves:
-            axes.legend(loc="lower right", frameon=True, framealpha=0.85, edgecolor="none", fontsize=9)
+            place = {"loc": "lower right"} if len(curves) <= FEW else {"loc": "upper center",
+                                                                       "bbox_to_anchor": (0.5, -0.14), "ncols": 2}
+            axes.legend(**place, frameon=True, framealpha=0.85, edgecolor="none", fontsize=9)
     grid[0].set_ylabel("share of solved seeds (95 % Wilson)")
     figure.suptitle(title, fontsize=10)
     return figure

@@ -9,6 +9,7 @@ from matplotlib.collections import LineCollection
 
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.experiments.claims import Claim, always, at_least, at_most, greater, higher, rate
+from pbcs_ompl.experiments.task_names import in_words
 from pbcs_ompl.figures.canvas import PALETTE, new_panels, publish
 from pbcs_ompl.figures.critic import critic_figure
 from pbcs_ompl.figures.diagnostics import curves_figure, success_figure
@@ -27,7 +28,7 @@ def analyse(records: list[dict[str, Any]], figures: Path) -> list[Claim]:
         _draw(next((record for record in chosen if 0 in record["seeds"]), chosen[0]), figures)
     panels = {"offline": [name for name in tables if name.startswith("offline")],
               "with steps of its own": [name for name in tables if not name.startswith("offline")]}
-    publish(success_figure({words: {name: tables[name] for name in names} for words, names in panels.items()},
+    publish(success_figure({words: {in_words(name): tables[name] for name in names} for words, names in panels.items()},
                            title="2x2 and 3x3 maze: solved by the policy without noise",
                            xlabel="steps of each seed; offline DDPG: updates"), figures / "success.png")
     ever = {variant: rate(success.any(axis=0).sum(), success.shape[1]) for variant, (_, success) in tables.items()}
