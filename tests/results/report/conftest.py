@@ -31,7 +31,7 @@ def analyse(records, figures):
 LINES = {
     "plan": (0, f"plan {MAZE} --goal 'reward>0' --planner Ex --planner-kwargs '{{\"control_duration\": 2}}'"
              " --max-seconds 60 --improve 10"),
-    "given": (1, f"train {MAZE} --path runs/plan --max-transitions 4000 --settings '{{\"beta\": 20}}'"),
+    "given": (1, f"train {MAZE} --method pbcs --path runs/plan --max-transitions 4000 --settings '{{\"beta\": 20}}'"),
     "training": (0, f"train {MAZE} --seed 3 --agent-settings '{{\"batch_size\": 90}}'"),
     "evaluation": (0, "eval runs/training --episodes 7 --epsilon 0.1"),
     "comparison": (0, f"compare --planners Ex SST {MAZE} '{{\"size\": 3}}' --seeds 2 --max-seconds 30 --max-memory 2000"
