@@ -19,7 +19,7 @@ from pbcs_ompl.experiments.study import find_study, study_ids
 
 DOCS = Path(__file__).parent
 PICTURES, PAGE = DOCS / "pictures" / "studies", DOCS / "studies_pictures.md"
-WIDTH, COLOURS = 1000, 96
+WIDTH, COLOURS = 1000, 256
 HEAD = """# All studies in pictures
 
 Made by `python docs/figures.py` from the records that come with the package; `pbcs study ID --from-records` makes the

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pbcs_ompl.core.types import Array
-from pbcs_ompl.figures.canvas import new_panels
+from pbcs_ompl.figures.canvas import colour, new_panels
 
 Runs = Mapping[str, Sequence[Mapping[str, Any]]]
 """The records of each planner in one environment; see docs/compare.md."""
@@ -81,8 +81,8 @@ def _draw_coverage(axes: Axes, runs: Runs) -> None:
             continue
         points = np.unique(np.concatenate([curve["transitions"] for curve in curves]))
         low, middle, high = np.quantile([_held(curve, points) for curve in curves], [0.25, 0.5, 0.75], axis=0)
-        axes.plot(points, middle, color=f"C{number}", linewidth=2, label=f"{name} ({len(curves)} runs)")
-        axes.fill_between(points, low, high, color=f"C{number}", alpha=0.2, linewidth=0)
+        axes.plot(points, middle, color=colour(number), linewidth=2, label=f"{name} ({len(curves)} runs)")
+        axes.fill_between(points, low, high, color=colour(number), alpha=0.2, linewidth=0)
     axes.set_ylim(bottom=0)
 
 
@@ -96,10 +96,10 @@ def _draw_lengths(axes: Axes, runs: Runs) -> None:
                           for reached, length in curves])
         low, middle, high = np.quantile(steps, [0.25, 0.5, 0.75], axis=0, method="nearest")
         known = np.isfinite(middle)
-        axes.step(points[known], middle[known], where="post", color=f"C{number}", linewidth=2,
+        axes.step(points[known], middle[known], where="post", color=colour(number), linewidth=2,
                   label=f"{name} ({len(curves)} runs)")
         axes.fill_between(points[known], low[known], np.where(np.isfinite(high), high, middle)[known], step="post",
-                          color=f"C{number}", alpha=0.2, linewidth=0)
+                          color=colour(number), alpha=0.2, linewidth=0)
     axes.set_ylim(bottom=0)
 
 

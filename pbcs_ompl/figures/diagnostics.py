@@ -1,6 +1,7 @@
 """Curves over training and slices of critics: what the diagnostics look like."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -44,8 +45,8 @@ def success_figure(panels: Mapping[str, Curves], *, title: str = "", xlabel: str
         axes.set_title(words, fontsize=10)
         axes.grid(alpha=0.3)
         if curves:
-            place = {"loc": "lower right"} if len(curves) <= FEW else {"loc": "upper center",
-                                                                       "bbox_to_anchor": (0.5, -0.14), "ncols": 2}
+            below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14), "ncols": 2}
+            place = below if len(curves) > FEW else {"loc": "lower right"}
             axes.legend(**place, frameon=True, framealpha=0.85, edgecolor="none", fontsize=9)
     grid[0].set_ylabel("share of solved seeds (95 % Wilson)")
     figure.suptitle(title, fontsize=10)

@@ -117,7 +117,7 @@ def _draw(variants: dict[str, Variant], figures: Path) -> None:
         axes.set_title(title, fontsize=10)
         axes.grid(alpha=0.3)
         if axes.get_legend_handles_labels()[0]:
-            axes.legend(loc="center left", frameon=True, framealpha=0.85, edgecolor="none", fontsize=9)
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, frameon=False, fontsize=9)
     panels[0].set_ylabel(f"return, mean of {LATE} episodes; band: 95 % (Student's t)")
     figure.suptitle("Sparse HalfCheetah", fontsize=10)
     publish(figure, figures / "returns.png")
