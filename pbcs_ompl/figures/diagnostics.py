@@ -45,8 +45,8 @@ def success_figure(panels: Mapping[str, Curves], *, title: str = "", xlabel: str
         axes.set_title(words, fontsize=10)
         axes.grid(alpha=0.3)
         if curves:
-            below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14), "ncols": 2}
-            place = below if len(curves) > FEW else {"loc": "lower right"}
+            below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14), "ncols": 2}
+            place: dict[str, Any] = below if len(curves) > FEW else {"loc": "lower right"}
             axes.legend(**place, frameon=True, framealpha=0.85, edgecolor="none", fontsize=9)
     grid[0].set_ylabel("share of solved seeds (95 % Wilson)")
     figure.suptitle(title, fontsize=10)
