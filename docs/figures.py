@@ -43,10 +43,15 @@ def section(study) -> str:
     with tempfile.TemporaryDirectory() as folder:
         result = run_study(study, out=Path(folder) / study.id, from_records=True)
         pictures = [kept(Path(figure), study.id) for figure in result.figures]
+    title = f"{study.title}."
+    if result.left_out:
+        title += (f" {len(result.records)} of {len(result.records) + sum(result.left_out.values())} runs; left out: "
+                  f"{', '.join(f'{name} ({count})' for name, count in result.left_out.items())}. `pbcs study {study.id} "
+                  f"--from-records --out DIR`, then `pbcs study {study.id} --out DIR` makes them.")
     claims = [f"* **{VERDICTS[claim['agrees']].lower()}**: {in_one_line(claim)}"
               for claim in result.summary()["agrees"]]
     figures = [f"![{path.stem.replace('-', ' ')}](pictures/studies/{path.name})" for path in pictures]
-    return "\n".join([f"## {study.id}", "", f"{study.title}.", "", *claims, "", *(f"{line}\n" for line in figures)])
+    return "\n".join([f"## {study.id}", "", title, "", *claims, "", *(f"{line}\n" for line in figures)])
 
 
 def kept(figure: Path, study: str) -> Path:
