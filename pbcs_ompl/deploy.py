@@ -298,7 +298,7 @@ class _RobotFollower(_Follower):
         self._shape = sides.shape[:2]
         self._all_sides = np.concatenate(list(sides)).T.copy()
         self._frame = FreeJoint(words["speeds"])
-        self._distances = np.append(self._distances, arrays["half"])  # where sides are told apart
+        self._distances = np.append(self._distances, arrays["half"])  # where the leading side looks
         self._body = np.delete(np.arange(self._shape[1]), self._entries)
 
     def step(self, observations: Array, memory: Memory) -> Step:
