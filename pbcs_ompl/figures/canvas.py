@@ -1,7 +1,7 @@
 """One style for all figures: sizes, fonts, colours; and writing a figure whole or not at all.
 
-Colours of categories are those of Okabe and Ito (2008) and two more, which the colour-blind can distinguish; quantities have one
-perceptual colour map.
+Colours of categories are those of Okabe and Ito (2008) and two more, which the colour-blind can distinguish; quantities
+have one perceptual colour map.
 """
 
 from contextlib import AbstractContextManager
