@@ -163,7 +163,7 @@ class Follow:
         terminals = reached | after.terminated | (progress.stalled >= self.settings.line.patience)
         gains = after.gains - self.settings.stray_cost * after.strayed
         rewards = (self.settings.progress_reward * gains - self.settings.effort_cost * (actions ** 2).mean(axis=1)
-                   + trainer.settings.success_reward * reached)
+                   + trainer.settings.success_reward * (reached * 1.0 - (after.terminated & ~reached)))
         trainer.agent.add_transitions(inputs[None], actions[None], rewards[None], task.inputs(after.position)[None],
                                       terminals[None])
         self._steps += 1
