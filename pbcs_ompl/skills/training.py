@@ -122,7 +122,7 @@ class Training:
         if self.folder:
             config = read_toml(self.folder.path / CONFIG)
             self.folder.write_config(config | {"planner_kwargs": found.planner_settings})
-        if self._goes_on(found, settings.search_on, transitions):
+        if self._continues(found, settings.search_on, transitions):
             further = self._searched(CONTINUED[found.planner], {}, settings.search_on, transitions)
             transitions += _made(further)
             if further.solved and _steps(further) < _steps(found):
@@ -141,8 +141,8 @@ class Training:
                     max_transitions=self.config.max_transitions - used, improve=f"{100 * share:g}%",
                     on_progress=self._report_planning)
 
-    def _goes_on(self, found: PlanResult, share: float, used: int) -> bool:
-        """Return whether the search goes on: making the plan shorter saved little, and the budget allows it."""
+    def _continues(self, found: PlanResult, share: float, used: int) -> bool:
+        """Return whether the search continues: making the plan shorter saved little, and the budget allows it."""
         shorter = found.improvement
         return (share > 0.0 and found.solved and shorter is not None and shorter.after > SHORTER * shorter.before
                 and found.planner in CONTINUED and not self.config.planner_kwargs

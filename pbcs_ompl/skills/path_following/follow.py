@@ -297,8 +297,7 @@ class Follow:
     def _failures(self, relay: Relay, starts: Position, until: IndexArray, epsilon: float) -> Trouble:
         """Return where executions from some starts [N] fail; training begins there from now on."""
         tries = self.task.execute(relay, starts, until=until, epsilon=epsilon, max_steps=self._max_steps,
-                                  patience=4 * self.settings.line.patience, rng=self.trainer.rng,
-                                  counter=self.trainer.counter)
+                                  rng=self.trainer.rng, counter=self.trainer.counter)
         mine = np.flatnonzero(tries.retries.progress.pointers < self.state.end)
         if len(mine):
             self._retries = tries.retries[mine]

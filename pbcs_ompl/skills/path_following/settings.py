@@ -16,7 +16,7 @@ class FollowSettings(PlannedSettings):
 
     A step is worth progress_reward * (its progress - stray_cost * how much further from the line it led, in steps)
     - effort_cost * (mean square of the action, in [-1, 1]), and `episodes.success_reward` more at the end, but as much
-    less where the environment terminates an episode elsewhere (ours: a crash then costs more than the way that is left).
+    less where the environment terminates an episode elsewhere (ours: a crash is then worse than a stop).
 
     Attributes:
         line: The plan as a line, and how policies see it.

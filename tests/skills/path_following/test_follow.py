@@ -111,7 +111,8 @@ def test_resuming_gives_the_same_bits(plan: Trajectory) -> None:
 def test_a_plan_that_moves_do_not_make_shorter_is_searched_for_further() -> None:
     """A car turns on circles: making the plan of Rides shorter saves nothing, and RidesSST finds a shorter one."""
     found = pbcs_ompl.train("pbcs/CarPark-v0", method="follow", seed=4, max_transitions=8000)
-    short = pbcs_ompl.train("pbcs/CarPark-v0", method="follow", seed=4, max_transitions=3000, settings={"search_on": 0.0})
+    short = pbcs_ompl.train("pbcs/CarPark-v0", method="follow", seed=4, max_transitions=3000,
+                            settings={"search_on": 0.0})
     assert found.trajectory is not None
     assert short.trajectory is not None
     assert (found.trajectory.planner, short.trajectory.planner) == ("RidesSST", "Rides")
