@@ -186,8 +186,8 @@ class PlanSettings(Settings):
         preceding_waypoints: Waypoints before a start point from which random rollouts may begin (ours: as many as
             `rollout_steps`; with 0, training stalls at 52 % of a plan of Ex on MountainCarContinuous-v0, seed 0).
         improve: Transitions that may make a plan shorter after the search, for each transition of the search (ours).
-        search_on: Where these save less than a tenth of the steps of a plan of Rides, the search is repeated and goes
-            on, by RidesSST, with this many transitions for each one of it (ours; 0 for never).
+        search_on: Where these save less than a tenth of the steps of a plan of Rides, the search is repeated, and
+            continued by RidesSST with this many transitions for each one of it (ours; 0 for never).
     """
 
     improve: float = 0.0
