@@ -20,6 +20,7 @@ from pbcs_ompl.experiments.study import find_study, study_ids
 DOCS = Path(__file__).parent
 PICTURES, PAGE = DOCS / "pictures" / "studies", DOCS / "studies_pictures.md"
 WIDTH, COLOURS = 1000, 256
+NAMED = 8  # kinds of missing runs
 HEAD = """# All studies in pictures
 
 Made by `python docs/figures.py` from the records that come with the package; `pbcs study ID --from-records` makes the
@@ -43,10 +44,20 @@ def section(study) -> str:
     with tempfile.TemporaryDirectory() as folder:
         result = run_study(study, out=Path(folder) / study.id, from_records=True)
         pictures = [kept(Path(figure), study.id) for figure in result.figures]
+    title = f"{study.title}." + (f" A part of its runs, {len(result.records)}: {others(result.left_out)}. "
+                                 f"`pbcs study {study.id} --from-records --out DIR`, then `pbcs study {study.id} --out "
+                                 f"DIR` makes these too." if result.left_out else "")
     claims = [f"* **{VERDICTS[claim['agrees']].lower()}**: {in_one_line(claim)}"
               for claim in result.summary()["agrees"]]
     figures = [f"![{path.stem.replace('-', ' ')}](pictures/studies/{path.name})" for path in pictures]
-    return "\n".join([f"## {study.id}", "", f"{study.title}.", "", *claims, "", *(f"{line}\n" for line in figures)])
+    return "\n".join([f"## {study.id}", "", title, "", *claims, "", *(f"{line}\n" for line in figures)])
+
+
+def others(left_out: dict[str, int]) -> str:
+    """Say which runs are missing."""
+    named = ", ".join(f"{count} of {name}" for name, count in list(left_out.items())[:NAMED])
+    rest = sum(list(left_out.values())[NAMED:])
+    return f"without {named}{f' and {rest} others' if rest else ''}"
 
 
 def kept(figure: Path, study: str) -> Path:

@@ -240,7 +240,7 @@ class _Follower:
         self._distances, self._firsts, self._entries = arrays["distances"], arrays["firsts"], arrays["entries"]
         self._unit, self._origin, self._scale = arrays["unit"], arrays["origin"], arrays["scale"]
         self._patience, self._lost_after = words["patience"], words.get("lost_after") or np.inf
-        self._reach, self._pass_radius = np.arange(words["reach"] + 1), arrays.get("pass_radius", np.inf)
+        self._reach, self._pass_square = np.arange(words["reach"] + 1), arrays.get("pass_radius", np.inf) ** 2
         sines, self._periods = arrays.get("sines", np.full(len(self._unit), -1)), arrays.get("periods")
         self._angles, self._sines, self._own = np.flatnonzero(sines >= 0), sines[sines >= 0], self._unit * (sines < 0)
 
@@ -254,7 +254,7 @@ class _Follower:
         if self._periods is not None:
             observations = observations.copy()
             observations[:, self._entries] += (near - places) * self._own
-        ahead = self._ahead(near, memory["pointer"])
+        ahead = self._ahead(near, memory["pointer"], self._distances)
         inputs = np.concatenate([(observations - self._origin) / self._scale, ahead.reshape(len(ahead), -1),
                                  np.minimum(memory["stalled"][:, None] / self._patience, 1.0)], axis=1)
         return inputs, np.searchsorted(self._firsts, memory["pointer"], side="right") - 1, None
@@ -269,26 +269,25 @@ class _Follower:
     def _advance(self, places: Array, memory: Memory) -> Array:
         """Move pointers to the nearest points ahead (of those passed, after a long wait); return what is near them."""
         pointer, stalled = memory["pointer"], memory["stalled"]
-        near = self._near(places, pointer)
         lost = np.flatnonzero(stalled >= self._lost_after)
         if len(lost):
-            squares = np.add.reduce((self.line - near[lost, None]) ** 2, axis=2)
+            squares = np.add.reduce(np.square(self.line - self._near(places, pointer)[lost, None]), axis=2)
             squares[np.arange(len(self.line)) > pointer[lost, None]] = np.inf
             pointer[lost], stalled[lost] = squares.argmin(axis=1), -1
-            near = self._near(places, pointer)
-        candidates = np.minimum(pointer[:, None] + self._reach, len(self.line) - 1)
-        squares = np.add.reduce((self.line[candidates] - near[:, None]) ** 2, axis=2)
-        barred = (squares[:, 1:] > squares[:, :-1]) & (squares[:, 1:] > self._pass_radius ** 2)
-        squares[:, 1:][np.logical_or.accumulate(barred, axis=1)] = np.inf
-        moved = candidates[np.arange(len(places)), squares.argmin(axis=1)]
-        stalled[:] = np.where(moved > pointer, 0, stalled + 1)
-        pointer[:] = moved
+        squares = np.add.reduce(np.square(self._ahead(self._near(places, pointer), pointer, self._reach)), axis=2)
+        later = squares[:, 1:]
+        barred = (later > squares[:, :-1]) & (later > self._pass_square)
+        np.copyto(later, np.inf, where=np.logical_or.accumulate(barred, axis=1))
+        moved = squares.argmin(axis=1)
+        stalled += 1
+        stalled[moved > 0] = 0
+        np.minimum(pointer + moved, len(self.line) - 1, out=pointer)
         return self._near(places, pointer)
 
-    def _ahead(self, places: Array, pointer: Indices) -> Array:
-        """Return the points of the line at the distances ahead, relative to where the episodes are [B, K, F]."""
-        shown = np.minimum(pointer[:, None] + self._distances, len(self.line) - 1)
-        return np.asarray(self.line[shown] - places[:, None])
+    def _ahead(self, places: Array, pointer: Indices, distances: Indices) -> Array:
+        """Return the points of the line some distances [K] ahead, relative to where the episodes are [B, K, F]."""
+        shown = self.line.take(np.minimum(pointer[:, None] + distances, len(self.line) - 1), axis=0)
+        return np.asarray(shown - places[:, None])
 
 
 class _RobotFollower(_Follower):
@@ -299,7 +298,8 @@ class _RobotFollower(_Follower):
         sides, self._actions = arrays["side_observations"], arrays["side_actions"]
         self._shape = sides.shape[:2]
         self._all_sides = np.concatenate(list(sides)).T.copy()
-        self._frame, self._half = FreeJoint(words["speeds"]), arrays["half"]
+        self._frame = FreeJoint(words["speeds"])
+        self._distances = np.append(self._distances, arrays["half"])  # where the leading side looks
         self._body = np.delete(np.arange(self._shape[1]), self._entries)
 
     def step(self, observations: Array, memory: Memory) -> Step:
@@ -310,15 +310,15 @@ class _RobotFollower(_Follower):
         """
         if not len(self.line):
             raise ValueError("there is no line to drive along; call follow(corners) first")
-        places, rows = observations[:, self._entries], np.arange(len(observations))
+        places, side, rows = observations.take(self._entries, axis=1), memory["side"], np.arange(len(observations))
         self._advance(places, memory)
-        pointer, side = memory["pointer"], memory["side"]
         all_seen = (observations @ self._all_sides).reshape(len(rows), *self._shape)
         headings = self._frame.heading(all_seen)
-        side[:] = self._leading(headings, places, pointer, side)
-        seen, turn = all_seen[rows, side], headings[rows, side].conj()
-        own = (_complex(self._ahead(places, pointer)) * turn[:, None]).view(np.float64)
-        body = (self._frame.turned(seen, turn)[:, self._body] - self._origin) / self._scale
+        ahead = _complex(self._ahead(places, memory["pointer"], self._distances))
+        side[:] = self._leading(headings, ahead[:, -1], side)
+        turn = headings[rows, side].conj()
+        own = (ahead[:, :-1] * turn[:, None]).view(np.float64)
+        body = (self._frame.turned(all_seen[rows, side], turn).take(self._body, axis=1) - self._origin) / self._scale
         inputs = np.concatenate([body, own, np.minimum(memory["stalled"][:, None] / self._patience, 1.0)], axis=1)
         return np.minimum(np.maximum(inputs, -LARGEST), LARGEST), np.zeros(len(rows), np.int64), side
 
@@ -326,20 +326,18 @@ class _RobotFollower(_Follower):
         """Return the controls [B, A] of the robot for those of the side that leads."""
         return (controls[:, None] @ self._actions[side])[:, 0]
 
-    def _leading(self, headings: Complex, places: Array, pointer: Indices, before: Indices) -> Indices:
+    def _leading(self, headings: Complex, ahead: Complex, before: Indices) -> Indices:
         """Return which side looks along the line [B]: the one that did as long as it does well enough.
 
         Args:
             headings: Where the sides look [B, S].
-            places: Where the robots are [B, 2].
-            pointer: The nearest points of the line [B].
+            ahead: Where the line leads [B].
             before: The sides that led before [B], -1 for none.
         """
         if headings.shape[1] == 1:
-            return np.zeros(len(places), np.int64)
-        direction = _unit(_complex(self.line[np.minimum(pointer + self._half, len(self.line) - 1)] - places))
-        along = (headings * direction.conj()[:, None]).real
-        kept = (along[np.arange(len(places)), before] >= KEEP_SIDE) & (before >= 0)
+            return np.zeros_like(before)
+        along = (headings * _unit(ahead).conj()[:, None]).real
+        kept = (along[np.arange(len(before)), before] >= KEEP_SIDE) & (before >= 0)
         return before if kept.all() else np.where(kept, before, along.argmax(axis=1))
 
 
@@ -354,7 +352,7 @@ class FreeJoint:
     """
 
     def __init__(self, speeds: int):
-        self._heads, self._speeds = speeds > 0, slice(speeds, speeds + 2)
+        self._heads, self._moved = speeds > 0, np.array([speeds, speeds + 1, *QUATERNION])
 
     def heading(self, seen: Array) -> Complex:
         """Return the directions [...] in which the x axis of the joint points in observations [..., O]."""
@@ -367,11 +365,13 @@ class FreeJoint:
         """Return observations [B, O] in a world that is turned [B]; the place is left out."""
         if not self._heads:
             return seen
+        moved = _complex(seen.take(self._moved, axis=1))
+        moved[:, 0] *= turn
+        quaternion = moved[:, 1:]
+        quaternion *= np.sqrt(turn)[:, None]
+        quaternion *= 1.0 - 2.0 * (quaternion[:, :1].real < 0)
         turned = seen.copy()
-        turned[:, self._speeds] = (_complex(seen[:, self._speeds].copy()) * turn)[:, None].view(np.float64)
-        quaternion = _complex(seen.take(QUATERNION, axis=1)) * np.sqrt(turn)[:, None]
-        quaternion *= np.where(quaternion[:, :1].real < 0, -1.0, 1.0)
-        turned[:, QUATERNION] = quaternion.view(np.float64)
+        turned[:, self._moved] = moved.view(np.float64)
         return turned
 
 

@@ -6,7 +6,7 @@ called squashed here; an `ActionBox` scales it to an action.
 """
 
 from collections.abc import Callable
-from math import log, pi
+from math import inf, log, pi
 from typing import NamedTuple
 
 import torch
@@ -52,6 +52,30 @@ def td_targets(rewards: Tensor, not_done: Tensor, next_values: Tensor, discount:
         discount: In [0, 1).
     """
     return torch.addcmul(rewards, not_done, next_values, value=discount)
+
+
+class CriticStack(NamedTuple):
+    """A stack of several critics of each seed: the first ones of all seeds, then the second ones."""
+
+    copies: int
+    """How many C each seed has."""
+    averaged: bool
+    """Whether an actor learns from their mean, else from the least of their values."""
+
+    def of(self, values: Tensor) -> Tensor:
+        """Return the values [C, S, B, 1] of each critic for those of the stack [C S, B, 1]."""
+        return values.view(self.copies, -1, *values.shape[1:])
+
+
+def least_values(values: Tensor, chosen: Tensor) -> Tensor:
+    """Return the least values [S, B, 1] of the chosen critics.
+
+    Args:
+        values: Those of a stack of critics, the first ones of all seeds first [C S, B, 1].
+        chosen: Which critics of each seed count [S, C].
+    """
+    each = values.view(chosen.shape[1], -1, *values.shape[1:])
+    return each.masked_fill(~chosen.T[:, :, None, None], inf).amin(dim=0)
 
 
 def critic_loss(critic: Network, obs_actions: Tensor, targets: Tensor) -> Tensor:
@@ -138,21 +162,25 @@ def squashed_log_density(inner: Tensor, log_std: Tensor, noise: Tensor) -> Tenso
 
 
 def soft_policy_loss(actor: Network, critics: Network, observations: Tensor, noise: Tensor, temperature: Tensor,
-                     box: ActionBox) -> tuple[Tensor, Tensor]:
+                     box: ActionBox, each: CriticStack) -> tuple[Tensor, Tensor]:
     """Return the mean of temperature log pi(a|s) - min_i Q_i(s, a) [S], a drawn from pi, and log pi(a|s) [S, B, 1].
+
+    Where the critics are averaged, their mean takes the place of their minimum (REDQ, Chen et al., 2021).
 
     Source: Haarnoja et al., 2018, Eq. 7 of "Soft actor-critic algorithms and applications".
 
     Args:
         actor: Mean and log standard deviation of pi before its tanh.
-        critics: Q_1 of all seeds, then Q_2, as one stack [2 S, B, 1].
+        critics: Q_1 of all seeds, then Q_2, ..., as one stack [C S, B, 1].
         observations: s [S, B, O].
         noise: Standard normal numbers [S, B, A].
         temperature: [S].
         box: Of the actions.
+        each: How many critics there are.
     """
     squashed, log_density = sample_squashed(actor(observations), noise)
-    values = torch.minimum(*critics(box.join(observations, squashed).repeat(2, 1, 1)).chunk(2))
+    values = each.of(critics(box.join(observations, squashed).repeat(each.copies, 1, 1)))
+    values = values.mean(dim=0) if each.averaged else values.amin(dim=0)
     return (temperature[:, None, None] * log_density - values).mean(dim=(1, 2)), log_density
 
 

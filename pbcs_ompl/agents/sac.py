@@ -21,14 +21,14 @@ from pbcs_ompl.agents.kernels.updates import SAC_KERNEL
 from pbcs_ompl.agents.networks import TrainedNetwork, TrainedScalar
 from pbcs_ompl.agents.policy import to_box
 from pbcs_ompl.agents.replay import Batch
-from pbcs_ompl.agents.settings import AgentSettings
+from pbcs_ompl.agents.several_critics import CriticsSettings, chosen_critics, teach_critics
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.core.options import check_range
 from pbcs_ompl.core.types import Array
 
 
 @dataclass(frozen=True)
-class SACSettings(AgentSettings):
+class SACSettings(CriticsSettings):
     """Settings of SAC.
 
     Attributes:
@@ -60,7 +60,16 @@ class SAC(StackedAgent):
     gradients = GRADIENTS
     kernel = SAC_KERNEL
     outputs_per_action = 2
-    num_critics = 2
+
+    @property
+    def num_critics(self) -> int:
+        """Critics of each seed."""
+        return self.settings.critics
+
+    @property
+    def is_averaged(self) -> bool:
+        """Whether the actor learns from the mean of the critics, as in REDQ, or from the least value, as in SAC."""
+        return self.settings.target_critics < self.settings.critics
 
     def make_networks(self, generators: Sequence[np.random.Generator]) -> dict[str, TrainedNetwork | TrainedScalar]:
         """Return actor, critics, and the logarithm of the temperature."""
@@ -79,35 +88,38 @@ class SAC(StackedAgent):
         return super().part(seeds) | {"num_samples": self._num_samples.clone()}
 
     def update_inputs(self, first: int, count: int) -> tuple[Sequence[Any] | Tensor, ...]:
-        """Return rates, and noise [S, 2, B, A] for the actions in the next and in the present states."""
+        """Return rates, noise [S, 2, B, A] for the actions in the next and present states, and critics [S, C]."""
         rates = (*self.adam_rates(first, count),
                  self.rates_of(self.settings.temperature_learning_rate, range(first, first + count)))
         noise = normal(self.stream_keys, first, count, (2, self.settings.batch_size, self.action_size))
-        return *rates, torch.from_numpy(noise).to(self.device)
+        chosen = chosen_critics(self.settings, self.seeds, first, count)
+        return *rates, *(torch.from_numpy(drawn).to(self.device) for drawn in (noise, chosen))
 
     def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor, temperature_rate: Tensor,
-               noise: Tensor) -> dict[str, Tensor]:
+               noise: Tensor, chosen: Tensor) -> dict[str, Tensor]:
         """Make one update; see `StackedAgent.update`."""
         temperature = self.log_temperature.values.exp()
-        targets = self.soft_targets(batch, noise[:, 0], temperature).repeat(2, 1, 1)
-        twins = self.minimise(self.critic, critic_rate, losses.critic_loss, batch.obs_actions.repeat(2, 1, 1), targets)
+        targets = self.soft_targets(batch, noise[:, 0], chosen, temperature)
+        critic_loss = teach_critics(self, batch, critic_rate, targets)
         actor_loss, log_density = self.minimise(self.actor, actor_rate, losses.soft_policy_loss, self.critic.weights,
-                                                batch.observations, noise[:, 1], temperature, self.box)
+                                                batch.observations, noise[:, 1], temperature, self.box,
+                                                losses.CriticStack(self.num_critics, self.is_averaged))
         self.minimise(self.log_temperature, temperature_rate, losses.temperature_loss, log_density, -self.action_size)
         self.critic.update_target(self.settings.polyak)
-        return {"critic_loss": twins.view(2, -1).sum(dim=0), "actor_loss": actor_loss, "temperature": temperature}
+        return {"critic_loss": critic_loss, "actor_loss": actor_loss, "temperature": temperature}
 
-    def soft_targets(self, batch: Batch, noise: Tensor, temperature: Tensor) -> Tensor:
+    def soft_targets(self, batch: Batch, noise: Tensor, chosen: Tensor, temperature: Tensor) -> Tensor:
         """Return y = r + discount (min_i Q'_i(s', a') - temperature log pi(a'|s')) [S, B, 1], or r at the end.
 
         Args:
             batch: The mini-batches.
             noise: Standard normal numbers [S, B, A], of which a' is made.
+            chosen: Whether a critic is among those with i [S, C].
             temperature: [S].
         """
         squashed, log_density = losses.sample_squashed(self.actor.weights(batch.next_observations), noise)
-        inputs = self.box.join(batch.next_observations, squashed).repeat(2, 1, 1)
-        next_values = torch.minimum(*self.critic.target(inputs).chunk(2))
+        inputs = self.box.join(batch.next_observations, squashed).repeat(self.num_critics, 1, 1)
+        next_values = losses.least_values(self.critic.target(inputs), chosen)
         next_values = next_values - temperature[:, None, None] * log_density
         return losses.td_targets(batch.rewards, batch.not_done, next_values, self.settings.discount)
 
@@ -122,5 +134,7 @@ class SAC(StackedAgent):
             return to_box(squashed.cpu().numpy(), self.action_low, self.action_high)
 
     def value(self, observations: Array, actions: Array) -> Array:
-        """Return what the actor maximises: the smaller of the twins' values [S, B] of actions [S, B, A]."""
-        return np.minimum(*np.split(self.critic_values(observations, actions), 2))
+        """Return what the actor maximises: the critics' least or mean values [S, B] of actions [S, B, A]."""
+        values = self.critic_values(observations, actions).reshape(self.num_critics, len(self.seeds), -1)
+        maximised: Array = values.mean(axis=0) if self.is_averaged else values.min(axis=0)
+        return maximised

@@ -62,7 +62,6 @@ class StackedAgent(ABC):
         gradients: Hand-written gradients of some losses, such as `kernels.gradients.GRADIENTS`; none for autograd.
         kernel: The updates as a compiled kernel for a CPU, if the algorithm has one.
         outputs_per_action: Outputs of the actor for each action; its first A, through a tanh, are the action.
-        num_critics: Critics of each seed. They are one stack: the first ones of all seeds, then the second ones.
         actor, critic: The networks.
         replay: The replay buffers.
         inputs: How the networks take observations and actions.
@@ -78,7 +77,6 @@ class StackedAgent(ABC):
     gradients: ClassVar[Mapping[Loss, Callable[..., Any]]] = {}
     kernel: ClassVar[Kernel | None] = None
     outputs_per_action: ClassVar[int] = 1
-    num_critics: ClassVar[int] = 1
 
     def __init_subclass__(cls) -> None:
         """Let no kernel stand for an `update` that it was not written for."""
@@ -118,6 +116,11 @@ class StackedAgent(ABC):
         self.actor = TrainedNetwork(actor, generators, self.device, law)
         self.critic = TrainedNetwork(critic, list(generators) * self.num_critics, self.device, law)
         return {"actor": self.actor, "critic": self.critic}
+
+    @property
+    def num_critics(self) -> int:
+        """Critics of each seed. They are one stack: the first ones of all seeds, then the second ones."""
+        return 1
 
     @abstractmethod
     def update(self, *arguments: Any, **_: Any) -> dict[str, Tensor]:

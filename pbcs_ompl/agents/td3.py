@@ -16,13 +16,13 @@ from pbcs_ompl.agents.kernels.counter_rng import normal
 from pbcs_ompl.agents.kernels.gradients import GRADIENTS
 from pbcs_ompl.agents.kernels.updates import TD3_KERNEL
 from pbcs_ompl.agents.replay import Batch
-from pbcs_ompl.agents.settings import AgentSettings
+from pbcs_ompl.agents.several_critics import CriticsSettings, chosen_critics, teach_critics
 from pbcs_ompl.agents.stacked_agent import StackedAgent
 from pbcs_ompl.core.options import check_range
 
 
 @dataclass(frozen=True)
-class TD3Settings(AgentSettings):
+class TD3Settings(CriticsSettings):
     """Settings of TD3.
 
     Attributes:
@@ -51,10 +51,14 @@ class TD3(StackedAgent):
     settings: TD3Settings
     gradients = GRADIENTS
     kernel = TD3_KERNEL
-    num_critics = 2
+
+    @property
+    def num_critics(self) -> int:
+        """Critics of each seed."""
+        return self.settings.critics
 
     def update_inputs(self, first: int, count: int) -> tuple[Sequence[Any] | Tensor, ...]:
-        """Return rates, the noise [S, B, A] on the target's actions, and whether actor and targets are updated."""
+        """Return rates, noise [S, B, A] on the target's actions, its critics [S, C], and whether the actor learns."""
         numbers, delay = range(first, first + count), self.settings.policy_delay
         critic_rates, _ = self.adam_rates(first, count)
         actor_rates = self.rates_of(self.settings.actor_learning_rate, [-(-n // delay) for n in numbers])
@@ -62,14 +66,14 @@ class TD3(StackedAgent):
         noise = normal(self.stream_keys, first, count, (self.settings.batch_size, self.action_size))
         noise = np.clip(np.float32(self.settings.target_noise) * noise, -bound, bound)
         full = [number % delay == 0 for number in numbers]
-        return critic_rates, actor_rates, torch.from_numpy(noise).to(self.device), full
+        chosen = torch.from_numpy(chosen_critics(self.settings, self.seeds, first, count)).to(self.device)
+        return critic_rates, actor_rates, torch.from_numpy(noise).to(self.device), chosen, full
 
-    def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor, noise: Tensor,
+    def update(self, batch: Batch, critic_rate: Tensor, actor_rate: Tensor, noise: Tensor, chosen: Tensor,
                full: bool) -> dict[str, Tensor]:
         """Make one update; the actor's loss is 0 in those that leave it as it is."""
-        targets = self.smoothed_targets(batch, noise).repeat(2, 1, 1)
-        twins = self.minimise(self.critic, critic_rate, losses.critic_loss, batch.obs_actions.repeat(2, 1, 1), targets)
-        critic_loss = twins.view(2, -1).sum(dim=0)
+        targets = self.smoothed_targets(batch, noise, chosen)
+        critic_loss = teach_critics(self, batch, critic_rate, targets)
         if not full:
             return {"critic_loss": critic_loss, "actor_loss": torch.zeros_like(critic_loss)}
         first = self.critic.weights.first(len(self.seeds))
@@ -77,9 +81,9 @@ class TD3(StackedAgent):
         self.update_targets()
         return {"critic_loss": critic_loss, "actor_loss": actor_loss}
 
-    def smoothed_targets(self, batch: Batch, noise: Tensor) -> Tensor:
-        """Return y = r + discount min_i Q'_i(s', pi'(s') + noise) [S, B, 1], or r at the end."""
+    def smoothed_targets(self, batch: Batch, noise: Tensor, chosen: Tensor) -> Tensor:
+        """Return y = r + discount min_i Q'_i(s', pi'(s') + noise) [S, B, 1], or r at the end; i is chosen [S, C]."""
         squashed = self.actor.target(batch.next_observations).tanh_().add_(noise).clamp_(-1.0, 1.0)
-        inputs = self.box.join(batch.next_observations, squashed).repeat(2, 1, 1)
-        next_values = torch.minimum(*self.critic.target(inputs).chunk(2))
+        inputs = self.box.join(batch.next_observations, squashed).repeat(self.num_critics, 1, 1)
+        next_values = losses.least_values(self.critic.target(inputs), chosen)
         return losses.td_targets(batch.rewards, batch.not_done, next_values, self.settings.discount)

@@ -59,7 +59,7 @@ def _make(study: Study, arguments: Namespace, out: Path) -> int:
                    "max_memory": arguments.max_memory, "on_progress": display}
         if shard is None:
             summary = run_study(study, from_records=arguments.from_records, **options).summary()
-            lines = _closing_lines(study.title, summary, out)
+            lines = _closing_lines(study.title, arguments.id, summary, out)
         else:
             records, failures = run_shard(study, shard, **options)
             failed = {name: failure.reason for name, failure in failures.items()}
@@ -94,8 +94,10 @@ def _failures(failed: dict[str, str]) -> list[tuple[str, str]]:
     return [("failed", f"{name}: {reason}") for name, reason in failed.items()]
 
 
-def _closing_lines(title: str, summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
+def _closing_lines(title: str, named: str, summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
+    left_out, remedy = sum(summary["left_out"].values()), command([*study_words(named), "--out", str(out)])
     lines = [(summary["id"], f"{title}: {summary['runs']} runs")]
+    lines += [("left out", f"{left_out} runs; {remedy} makes them")] if left_out else []
     lines += [(VERDICTS[claim["agrees"]], in_one_line(claim)) for claim in summary["agrees"]]
     lines += _failures(summary["failed"])
     pictures = sorted(Path(figure).stem for figure in summary["figures"])

@@ -1,13 +1,17 @@
 """Ctrl-C, and what stops a program in the same way: SIGTERM (Slurm, systemd, kill), SIGHUP (a terminal that closes)."""
 
 import signal
+import sys
 import threading
+from _thread import interrupt_main
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """The signals that ask a program to stop; Windows has no SIGHUP."""
+MOMENT = 0.02
+"""Seconds after which a signal that Python had to drop is raised again."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -45,9 +49,10 @@ def _raise(number: int, frame: Any) -> None:
 def signals_interrupt() -> Iterator[None]:
     """Let SIGTERM and SIGHUP raise `Interrupted` wherever the program happens to be, as Ctrl-C does.
 
-    A signal that is ignored (`nohup`) or has a handler stays as it is.
+    A signal that is ignored (`nohup`) or has a handler stays as it is. In a callback of C, as those of LLVM while it
+    compiles, and in `__del__`, Python drops what is raised: then the signal comes again a moment later, Ctrl-C too.
     """
-    with _handled(_raise, (signal.SIG_DFL,)):
+    with _handled(_raise, (signal.SIG_DFL,)), _dropped_ones_again():
         yield
 
 
@@ -71,6 +76,26 @@ def interruptible(on_interrupt: Callable[[KeyboardInterrupt], None]) -> Iterator
 
     with _handled(stop_once, (signal.SIG_DFL, signal.default_int_handler, _raise)):
         yield
+
+
+@contextmanager
+def _dropped_ones_again() -> Iterator[None]:
+    """Let a signal come again when the exception that it raised was dropped; others that are dropped are reported."""
+    before = sys.unraisablehook
+
+    def hook(dropped: Any) -> None:
+        if isinstance(dropped.exc_value, KeyboardInterrupt):
+            again = threading.Timer(MOMENT, interrupt_main, (signal_of(dropped.exc_value),))
+            again.daemon = True
+            again.start()
+        else:
+            before(dropped)
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """Run a study: the runs that were not made yet, then the analysis; or one shard of the runs."""
 
 import os
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +33,7 @@ class StudyResult:
         out: The folder with the files.
         figures: The pictures.
         agrees: The claims.
+        left_out: How many runs the records that come with the study lack, by the names of runs without their numbers.
 
     Example:
         >>> import pbcs_ompl
@@ -46,11 +48,12 @@ class StudyResult:
     out: str
     figures: list[str]
     agrees: list[Claim]
+    left_out: dict[str, int]
 
     def summary(self) -> dict[str, Any]:
         """Return plain values."""
-        return {"id": self.id, "runs": len(self.records), "failed": self.failed, "out": self.out,
-                "figures": self.figures, "agrees": [claim.to_dict() for claim in self.agrees]}
+        return {"id": self.id, "runs": len(self.records), "left_out": self.left_out, "failed": self.failed,
+                "out": self.out, "figures": self.figures, "agrees": [claim.to_dict() for claim in self.agrees]}
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,8 @@ def run_study(study: Study | str | Path, *, out: str | Path, seeds: int | None =
         with code_of_others(f"the analysis of the study {chosen.id}"):
             claims = chosen.analyse(list(records.values()), figures)
         result = StudyResult(chosen.id, list(records.values()), failed, str(folder.path),
-                             [str(path) for path in sorted(figures.glob("*.png"))], claims)
+                             [str(path) for path in sorted(figures.glob("*.png"))], claims,
+                             dict(Counter(map(_series, runs)) - Counter(map(_series, made))))
         folder.write_result(result.summary())
     return result
 
@@ -153,6 +157,11 @@ def open_study(study: Study, out: str | Path, seeds: int | None = None, *, shard
     config = {"kind": "study", "study": study.id, "folder": _published(study.folder),
               "seeds": study.number_of_seeds(seeds), **study.sweep}
     return open_run(Path(out), config, may_change=("folder", "seeds"), shard=shard)
+
+
+def _series(run: Run) -> str:
+    """Return the name of a run without its number."""
+    return run.name.rpartition("-")[0]
 
 
 def _published(folder: Path) -> str | None:

@@ -25,8 +25,9 @@ from pbcs_ompl.resettable.observations import flat
 from pbcs_ompl.resettable.rules import GoalRule, Outcome, goal_rule, granted_success
 from pbcs_ompl.resettable.task_env import explored_actions
 
-SIDE_BY_SIDE = 100
-"""Episodes that a controller drives at the same time, each in an environment of its own."""
+SIDE_BY_SIDE = 20
+"""Episodes that a controller drives at the same time, each in an environment of its own; the next ones begin in these
+environments with a reset. To make an environment takes MuJoCo longer than an episode."""
 Ending = Literal["goal", "terminated", "truncated", "end of the actions", "time limit"]
 
 

@@ -91,7 +91,7 @@ def _vectors(observed: Any) -> Array:
         rows = [_vectors(part) for part in observed]
     else:
         given = np.asarray(observed, dtype=np.float64)
-        return given.reshape(len(given), -1)
+        return given.reshape(len(given), int(np.prod(given.shape[1:])))  # -1 is refused for no rows
     return np.concatenate(rows, axis=1)
 
 

@@ -15,6 +15,10 @@ LOW, HIGH = np.array([-1.0, 0.0]), np.array([0.5, 10.0])
 HALF, CENTRE = (HIGH - LOW) / 2, (HIGH + LOW) / 2
 BOX = ActionBox(torch.tensor(HALF).float(), torch.tensor(CENTRE).float())
 DISCOUNT, BATCH, SEEDS = 0.9, 32, 2
+LOSSES = pytest.mark.parametrize(("loss", "averaged"), [*((loss, False) for loss in GRADIENTS),
+                                                        (losses.soft_policy_loss, True)],
+                                 ids=lambda value: getattr(value, "__name__", value))
+"""Every loss that has a gradient by hand; that of SAC's actor with the mean of the critics too."""
 CPU = torch.device("cpu")
 
 
@@ -27,7 +31,7 @@ def randn(*shape: int, seed: int = 0) -> torch.Tensor:
     return torch.randn(*shape, generator=torch.Generator().manual_seed(seed))
 
 
-def arguments(loss: object, layer_norm: bool) -> tuple:
+def arguments(loss: object, layer_norm: bool, averaged: bool = False) -> tuple:
     """What the loss is given: first what is trained, then the rest."""
     actor, critic = network(2, 1, 2, layer_norm=layer_norm), network(1, 3, 4, inputs=5, layer_norm=layer_norm)
     observations = randn(SEEDS, BATCH, 3)
@@ -43,9 +47,9 @@ def arguments(loss: object, layer_norm: bool) -> tuple:
         return actor, critic.weights, obs_actions, targets, BOX
     if loss is losses.soft_policy_loss:
         actor = network(4, 1, 2, layer_norm=layer_norm)
-        critics = network(1, 3, 4, 5, 6, inputs=5, layer_norm=layer_norm)
-        noise = randn(SEEDS, BATCH, 2, seed=3)
-        return actor, critics.weights, observations, noise, torch.tensor([0.3, 0.1]), BOX
+        critics = network(1, *range(3, 9), inputs=5, layer_norm=layer_norm)
+        noise, stack = randn(SEEDS, BATCH, 2, seed=3), losses.CriticStack(3, averaged)
+        return actor, critics.weights, observations, noise, torch.tensor([0.3, 0.1]), BOX, stack
     assert loss is losses.temperature_loss
     return TrainedScalar(torch.tensor([-1.0, 0.5]), CPU), randn(SEEDS, BATCH, 1), -2.0
 
@@ -55,9 +59,9 @@ def flat_gradient(trained: TrainedNetwork | TrainedScalar) -> torch.Tensor:
 
 
 @pytest.mark.parametrize("layer_norm", [False, True])
-@pytest.mark.parametrize("loss", GRADIENTS, ids=lambda loss: loss.__name__)
-def test_hand_written_gradients_equal_autograd(loss, layer_norm: bool) -> None:
-    trained, *rest = arguments(loss, layer_norm)
+@LOSSES
+def test_hand_written_gradients_equal_autograd(loss, averaged: bool, layer_norm: bool) -> None:
+    trained, *rest = arguments(loss, layer_norm, averaged)
     expected, gradient = trained.autograd(loss, *rest), flat_gradient(trained)
     outcome, by_hand = GRADIENTS[loss](trained, *rest), flat_gradient(trained)
     torch.testing.assert_close(outcome, expected, rtol=1e-6, atol=1e-6)
@@ -65,10 +69,10 @@ def test_hand_written_gradients_equal_autograd(loss, layer_norm: bool) -> None:
     assert gradient.abs().max() > 0.0
 
 
-@pytest.mark.parametrize("loss", GRADIENTS, ids=lambda loss: loss.__name__)
-def test_autograd_equals_difference_quotients(loss) -> None:
+@LOSSES
+def test_autograd_equals_difference_quotients(loss, averaged: bool) -> None:
     """In float32 only two digits of a quotient are sure: it is taken along the gradient itself, where it is largest."""
-    trained, *rest = arguments(loss, layer_norm=False)
+    trained, *rest = arguments(loss, False, averaged)
     trained.autograd(loss, *rest)
     gradient = flat_gradient(trained)
     values = trained.values if isinstance(trained, TrainedScalar) else trained.weights.flat
@@ -133,17 +137,22 @@ def row_losses(loss: object, trained, rest: list, seed: int) -> list[float]:
         return [float(one * np.sum((np.tanh(own(pair[:3])) - (pair[3:] - CENTRE) / HALF) ** 2))
                 for one, pair in zip(better, double[1], strict=True)]
     drawn = [draw(own, state, noise) for state, noise in zip(double[1], double[2], strict=True)]
-    return [float(rest[3][seed]) * density - min(q(critic, state, squashed) for critic in critics)
+    value = np.mean if rest[-1].averaged else min
+    return [float(rest[3][seed]) * density - value([q(critic, state, squashed) for critic in critics])
             for state, (squashed, density) in zip(double[1], drawn, strict=True)]
 
 
-@pytest.mark.parametrize("loss", GRADIENTS, ids=lambda loss: loss.__name__)
-def test_losses_equal_their_equations_row_by_row(loss) -> None:
-    trained, *rest = arguments(loss, layer_norm=False)
+@LOSSES
+def test_losses_equal_their_equations_row_by_row(loss, averaged: bool) -> None:
+    trained, *rest = arguments(loss, False, averaged)
     outcome = loss(trained.values if isinstance(trained, TrainedScalar) else trained.weights, *rest)
     values = outcome[0] if isinstance(outcome, tuple) else outcome
     for seed in range(SEEDS):
         assert float(values[seed]) == pytest.approx(np.mean(row_losses(loss, trained, rest, seed)), rel=1e-4, abs=1e-5)
+
+
+CHOSEN = torch.tensor([[True, False, True], [False, True, True]])
+"""Which of three critics of each seed give its targets."""
 
 
 def trained_agent(kind: type[StackedAgent], **settings: object) -> StackedAgent:
@@ -185,15 +194,15 @@ def test_targets_of_ddpg_equal_eq_1_2(kind: type[StackedAgent]) -> None:
             assert value == pytest.approx(q(critic, state, np.tanh(actor(state))), rel=1e-3, abs=1e-4)
 
 
-def test_targets_of_td3_are_the_smaller_twin_at_a_smoothed_action() -> None:
-    agent, noise = trained_agent(TD3), randn(SEEDS, BATCH, 2)
+def test_targets_of_td3_are_the_least_value_of_the_chosen_critics_at_a_smoothed_action() -> None:
+    agent, noise = trained_agent(TD3, critics=3), randn(SEEDS, BATCH, 2)
     batch = batch_of(agent)
     for seed in range(SEEDS):
         actor = numpy_network(agent.actor, seed, True)
-        twins = [numpy_network(agent.critic, index, True) for index in (seed, seed + SEEDS)]
-        for state, value, index in next_values(batch, agent.smoothed_targets(batch, noise), seed):
+        two = [numpy_network(agent.critic, index, True) for index in CHOSEN[seed].nonzero()[:, 0] * SEEDS + seed]
+        for state, value, index in next_values(batch, agent.smoothed_targets(batch, noise, CHOSEN), seed):
             disturbed = np.tanh(actor(state)) + noise[seed, index].double().numpy()
-            expected = min(q(twin, state, np.clip(disturbed, -1.0, 1.0)) for twin in twins)
+            expected = min(q(critic, state, np.clip(disturbed, -1.0, 1.0)) for critic in two)
             assert value == pytest.approx(expected, rel=1e-3, abs=1e-4)
 
 
@@ -206,15 +215,15 @@ def test_noise_on_the_actions_of_td3_is_clipped() -> None:
     assert float(noise.std()) == pytest.approx(float((0.4 * normal).clamp(-0.5, 0.5).std()), rel=0.02)
 
 
-def test_targets_of_sac_are_the_smaller_twin_and_the_entropy() -> None:
-    agent, noise, temperature = trained_agent(SAC), randn(SEEDS, BATCH, 2), torch.tensor([0.3, 0.7])
+def test_targets_of_sac_are_the_least_value_of_the_chosen_critics_and_the_entropy() -> None:
+    agent, noise, temperature = trained_agent(SAC, critics=3), randn(SEEDS, BATCH, 2), torch.tensor([0.3, 0.7])
     batch = batch_of(agent)
     for seed in range(SEEDS):
         actor = numpy_network(agent.actor, seed)
-        twins = [numpy_network(agent.critic, index, True) for index in (seed, seed + SEEDS)]
-        for state, value, index in next_values(batch, agent.soft_targets(batch, noise, temperature), seed):
+        two = [numpy_network(agent.critic, index, True) for index in CHOSEN[seed].nonzero()[:, 0] * SEEDS + seed]
+        for state, value, index in next_values(batch, agent.soft_targets(batch, noise, CHOSEN, temperature), seed):
             squashed, density = draw(actor, state, noise[seed, index].double().numpy())
-            expected = min(q(twin, state, squashed) for twin in twins) - float(temperature[seed]) * density
+            expected = min(q(critic, state, squashed) for critic in two) - float(temperature[seed]) * density
             assert value == pytest.approx(expected, rel=1e-3, abs=1e-4)
 
 

@@ -5,7 +5,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from pbcs_ompl.agents import DDPG, SAC, TD3, StackedAgent
+from pbcs_ompl.agents import DDPG, SAC, TD3, StackedAgent, TD3Settings
+from pbcs_ompl.agents.several_critics import chosen_critics
 
 KINDS = [DDPG, TD3, SAC]
 
@@ -49,6 +50,27 @@ def test_the_log_standard_deviation_of_sac_is_bounded_in_the_kernel() -> None:
     eager.train(5)
     assert_equal(kernel, eager, 1e-5)
     assert torch.equal(kernel.actor.weights.layers[-1].bias[..., 2:], frozen)
+
+
+@pytest.mark.parametrize(("critics", "target_critics"), [(3, 3), (5, 2), (1, 1)])
+@pytest.mark.parametrize("kind", [TD3, SAC])
+def test_any_number_of_critics_is_updated_as_by_torch(kind: type[StackedAgent], critics: int,
+                                                      target_critics: int) -> None:
+    kernel, eager = pair(kind, hidden=(16, 12), critics=critics, target_critics=target_critics)
+    mine, theirs = kernel.train(20), eager.train(20)
+    assert_equal(kernel, eager, 1e-5)
+    for name in mine:
+        np.testing.assert_allclose(mine[name], theirs[name], rtol=1e-4, atol=1e-6)
+    assert kernel.critic_values(np.zeros((2, 1, 5)), np.zeros((2, 1, 2))).shape == (2 * critics, 1)
+
+
+def test_each_update_draws_as_many_critics_as_give_its_target() -> None:
+    settings = TD3Settings(critics=4, target_critics=2)
+    chosen = chosen_critics(settings, [3, 4, 5], 1, 1200)
+    assert (chosen.sum(axis=2) == 2).all()
+    np.testing.assert_allclose(chosen.mean(axis=0), 0.5, atol=0.06)  # four deviations
+    assert np.array_equal(chosen_critics(settings, [3, 4, 5], 501, 7), chosen[500:507])
+    assert np.array_equal(chosen_critics(settings, [4], 1, 9)[:, 0], chosen[:9, 1])
 
 
 @pytest.mark.parametrize("kind", KINDS)

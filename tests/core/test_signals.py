@@ -1,8 +1,11 @@
 """SIGTERM and SIGHUP ask to stop as Ctrl-C does; handlers of a host application stay."""
 
+import ctypes
 import os
 import signal
+import sys
 import threading
+import time
 
 import pytest
 
@@ -35,6 +38,25 @@ def test_elsewhere_it_raises_at_once(number):
         os.kill(os.getpid(), number)
     assert signal_of(with_remedy(caught.value, "go on")) == number
     assert str(with_remedy(caught.value, "go on")) == "go on"
+
+
+@pytest.mark.parametrize("number", STOPPING)
+def test_in_a_callback_of_c_it_raises_a_moment_later(number):
+    callback = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), number))
+    with pytest.raises(KeyboardInterrupt) as caught, signals_interrupt():  # noqa: PT012
+        callback()
+        end = time.monotonic() + 10
+        while time.monotonic() < end:
+            time.sleep(0.001)
+    assert signal_of(caught.value) == number
+
+
+def test_other_dropped_exceptions_are_reported(monkeypatch):
+    reported = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda dropped: reported.append(dropped.exc_type))
+    with signals_interrupt():
+        ctypes.CFUNCTYPE(None)(lambda: 1 / 0)()
+    assert reported == [ZeroDivisionError]
 
 
 @pytest.mark.parametrize("handler", [signal.SIG_IGN, lambda *_: None])

@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pbcs_ompl.cli import main
 
@@ -59,6 +60,7 @@ USES = {
     "study": ["report runs/study", "study coin-toss --out runs/study"],
 }
 """What a user does with each folder. A training that was stopped has used its budget, so that resuming is short."""
+MEASURED = re.compile(r"seconds.*|memory.*|out|database|progress|cpu_seconds")
 TIMES = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d(:\d\d)?(\+\d\d:\d\d)?|[\d.]+ (s|min|h)\b|\"seconds\": [\d.e-]+")
 
 
@@ -132,6 +134,13 @@ def files_of(folder: Path) -> list[Path]:
     names = (path.relative_to(folder) for path in sorted(folder.rglob("*")) if path.is_file())
     return [name for name in names if name.suffix in (".json", ".toml", ".npz", ".safetensors")
             and name.name not in ("tree.npz",)]
+
+
+def without_measured(value: Any) -> Any:
+    """Return plain values without what is measured and so differs from run to run."""
+    if isinstance(value, dict):
+        return {name: without_measured(item) for name, item in value.items() if not MEASURED.fullmatch(name)}
+    return [without_measured(item) for item in value] if isinstance(value, list) else value
 
 
 def as_words(value: object) -> str:

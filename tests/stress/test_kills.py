@@ -16,12 +16,12 @@ from collections import Counter
 import numpy as np
 import psutil
 import pytest
+from stress.others_results import without_measured
 
 SEED = 20261127
 KILLS = {"plan": 15, "train": 21, "follow": 12, "compare": 12, "study": 12}
 SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 LEFTOVER = re.compile(r"\..+\.[0-9a-f]{8}(-journal)?|\.lock.*")
-MEASURED = re.compile(r"seconds.*|memory.*|out|database|progress|cpu_seconds")
 NOT_COMPARED = {"provenance.json", "comparison.db"}
 SCRIPT = """
 import random, time
@@ -109,12 +109,6 @@ def contents(out):
         else:
             found[name] = path.read_bytes() if path.suffix in (".npz", ".safetensors", ".toml") else None
     return found
-
-
-def without_measured(value):
-    if isinstance(value, dict):
-        return {name: without_measured(item) for name, item in value.items() if not MEASURED.fullmatch(name)}
-    return [without_measured(item) for item in value] if isinstance(value, list) else value
 
 
 def killed_folders(verb, folder, moments):

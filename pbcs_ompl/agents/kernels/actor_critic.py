@@ -46,7 +46,7 @@ class Scratch(NamedTuple):
     critic_grads: np.ndarray
     critic_gradient: np.ndarray
     values: np.ndarray
-    """The least values of a seed's critics [B]."""
+    """The least values of a seed's critics, or their means [B]."""
     least: np.ndarray
     """Which critic has it [B]."""
     targets: np.ndarray
@@ -109,20 +109,42 @@ def set_actions(actor: Stack, noise: np.ndarray, pair: int, constants: Constants
 
 
 @njit(inline="always")
-def least_values(critic: Stack, flat: np.ndarray, seed: int, scratch: Scratch) -> None:
-    """Fill the least values of a seed's critics, with the weights `flat`, at the pairs."""
-    batch, twins = len(scratch.values), len(scratch.critic_activations)
+def least_values(critic: Stack, flat: np.ndarray, seed: int, chosen: np.ndarray, scratch: Scratch) -> None:
+    """Fill the least values of a seed's critics at the pairs.
+
+    Args:
+        critic: Of all seeds.
+        flat: Their weights, or their targets'.
+        seed: Which one.
+        chosen: Which of its critics count [C].
+        scratch: Working memory.
+    """
+    batch, copies, any_yet = len(scratch.values), len(chosen), False
     out, inputs = nets.outputs_offset(critic.shape, batch), batch * critic.shape.sizes[0]
-    for twin in range(twins):
-        activations = scratch.critic_activations[twin]
-        for i in range(inputs if twin > 0 else 0):
+    for copy in range(copies):
+        if not chosen[copy]:
+            continue
+        activations = scratch.critic_activations[copy]
+        for i in range(inputs if copy > 0 else 0):
             activations[i] = scratch.critic_activations[0, i]
-        member = nets.Member(critic.total, twin * (critic.total // twins) + seed)
-        nets.forward(critic.shape, flat, member, activations, batch)
+        nets.forward(critic.shape, flat, nets.Member(critic.total, copy * (critic.total // copies) + seed), activations,
+                     batch)
         for item in range(batch):
             # A value that is not a number stays the least.
-            if twin == 0 or not activations[out + item] >= scratch.values[item]:
-                scratch.values[item], scratch.least[item] = activations[out + item], twin
+            if not any_yet or not activations[out + item] >= scratch.values[item]:
+                scratch.values[item], scratch.least[item] = activations[out + item], copy
+        any_yet = True
+
+
+@njit(inline="always")
+def average_values(critic: Stack, scratch: Scratch) -> None:
+    """Put the mean of a seed's critics in place of the least of their values, after `least_values` of all of them."""
+    out, copies = nets.outputs_offset(critic.shape, len(scratch.values)), len(scratch.critic_activations)
+    for item in range(len(scratch.values)):
+        total = np.float32(0.0)
+        for copy in range(copies):
+            total += scratch.critic_activations[copy, out + item]
+        scratch.values[item] = total / np.float32(copies)
 
 
 @njit(inline="always")

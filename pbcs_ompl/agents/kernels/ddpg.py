@@ -32,13 +32,13 @@ def update_seed(rows: np.ndarray, inputs: tuple[np.ndarray, np.ndarray], network
     """
     critic_rates, actor_rates = inputs
     actor, critic = networks
-    pair, without_noise = critic.shape.sizes[0], np.empty((0, 0), np.float32)
+    pair, without_noise, chosen = critic.shape.sizes[0], np.empty((0, 0), np.float32), np.ones(1, np.bool_)
     scratch = new_scratch(actor, critic, rows.shape[2])
     for k in range(len(rows)):
         batch = rows[k, seed]
         run_actor(actor, actor.target, seed, batch, pair + 2, pair, scratch)
         set_actions(actor, without_noise, pair, constants, scratch)
-        least_values(critic, critic.target, seed, scratch)
+        least_values(critic, critic.target, seed, chosen, scratch)
         set_targets(batch, pair, constants, scratch)
         losses[k, seed, 0] = critic_step(batch, seed, critic, critic_rates[k], scratch)
         losses[k, seed, 1] = policy_step(batch, seed, actor, critic, actor_rates[k], constants, scratch)

@@ -14,7 +14,7 @@ from torch import Tensor
 from pbcs_ompl.agents import losses
 from pbcs_ompl.agents.kernels.layer_norm import LAYER_NORM_EPSILON
 from pbcs_ompl.agents.kernels.sac import LOG_STD
-from pbcs_ompl.agents.losses import ActionBox, squashed_log_density
+from pbcs_ompl.agents.losses import ActionBox, CriticStack, squashed_log_density
 from pbcs_ompl.agents.networks import Layer, Loss, Norm, TrainedNetwork, TrainedScalar, Weights
 
 
@@ -147,7 +147,7 @@ def _pull(actor: TrainedNetwork, activations: Activations, squashed: Tensor, err
 
 
 def soft_policy_gradient(actor: TrainedNetwork, critics: Weights, observations: Tensor, noise: Tensor,
-                         temperature: Tensor, box: ActionBox) -> tuple[Tensor, Tensor]:
+                         temperature: Tensor, box: ActionBox, each: CriticStack) -> tuple[Tensor, Tensor]:
     """Do `losses.soft_policy_loss`."""
     weight = temperature[:, None, None]
     outputs, actor_activations = forward(actor.weights, observations)
@@ -156,17 +156,21 @@ def soft_policy_gradient(actor: TrainedNetwork, critics: Weights, observations: 
     std = log_std.exp()
     inner = torch.addcmul(mean, std, noise)
     squashed, log_density = inner.tanh(), squashed_log_density(inner, log_std, noise)
-    values, activations = forward(critics, box.join(observations, squashed).repeat(2, 1, 1))
-    first, second = values.chunk(2)
-    part = 1.0 / first.shape[1]
-    grad = torch.cat((torch.where(first <= second, -part, 0.0), torch.where(first <= second, 0.0, -part)))
-    grad = torch.add(*input_gradient(critics, activations, grad).chunk(2))
+    stacked, activations = forward(critics, box.join(observations, squashed).repeat(each.copies, 1, 1))
+    values = each.of(stacked)
+    part = 1.0 / values.shape[2]
+    if each.averaged:
+        value, grad = values.mean(dim=0), torch.full_like(values, -part / each.copies)
+    else:
+        value, least = values.min(dim=0)
+        grad = torch.zeros_like(values).scatter_(0, least[None], -part)
+    grad = each.of(input_gradient(critics, activations, grad.view_as(stacked))).sum(dim=0)
     grad = grad[..., observations.shape[2] :] * box.half
     # By u: the critic's gradient through the tanh, and that of the density's -log(1 - tanh(u)^2).
     by_inner = torch.ops.aten.tanh_backward(grad, squashed) + 2.0 * part * weight * squashed
     by_log_std = (by_inner * noise * std - part * weight) * (log_std == free_log_std)
     backward(actor.weights, actor_activations, torch.cat((by_inner, by_log_std), dim=2), actor.gradient)
-    return (weight * log_density - torch.minimum(first, second)).mean(dim=(1, 2)), log_density
+    return (weight * log_density - value).mean(dim=(1, 2)), log_density
 
 
 def temperature_gradient(log_temperature: TrainedScalar, log_density: Tensor, target_entropy: float) -> Tensor:

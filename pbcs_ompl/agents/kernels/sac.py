@@ -11,6 +11,7 @@ from pbcs_ompl.agents.kernels.actor_critic import (
     Scratch,
     Stack,
     actor_step,
+    average_values,
     critic_step,
     least_values,
     new_scratch,
@@ -35,38 +36,39 @@ class Scalar(NamedTuple):
 
 
 @njit(nogil=True)
-def update_seed(rows: np.ndarray, inputs: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+def update_seed(rows: np.ndarray, inputs: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
                 networks: tuple[Stack, Stack, Scalar], constants: Constants, losses: np.ndarray, seed: int) -> None:
     """Make K updates of one seed; see `updates.Kernel`.
 
     Args:
         rows: Mini-batches [K, S, B, W].
         inputs: Rates of critic, actor and temperature [K, 2], and noise for the actions in the next and in the present
-            states [K, S, 2, B, A].
+            states [K, S, 2, B, A], and which critics give the targets [K, S, C].
         networks: Actor, critics, and the logarithm of the temperature.
         constants: What does not change.
         losses: Filled with the critics' and the actor's losses, and the temperature [K, S, 3].
         seed: Which one.
     """
-    critic_rates, actor_rates, temperature_rates, noise = inputs
+    critic_rates, actor_rates, temperature_rates, noise, chosen = inputs
     actor, critic, scalar = networks
     pair = critic.shape.sizes[0]
     scratch = new_scratch(actor, critic, rows.shape[2])
     density = np.empty(rows.shape[2], np.float32)
+    averaged = not chosen[0, seed].all()  # see `sac.SAC.is_averaged`
     for k in range(len(rows)):
         batch, temperature = rows[k, seed], np.exp(scalar.values[seed])
         run_actor(actor, actor.weights, seed, batch, pair + 2, pair, scratch)
         draw_actions(actor, noise[k, seed, 0], pair, constants, scratch, density)
-        least_values(critic, critic.target, seed, scratch)
+        least_values(critic, critic.target, seed, chosen[k, seed], scratch)
         for item in range(len(density)):
             scratch.values[item] -= temperature * density[item]
         set_targets(batch, pair, constants, scratch)
         losses[k, seed, 0] = critic_step(batch, seed, critic, critic_rates[k], scratch)
         losses[k, seed, 1] = soft_policy_step(batch, seed, actor, critic, actor_rates[k], noise[k, seed, 1],
-                                              temperature, constants, scratch, density)
+                                              temperature, averaged, constants, scratch, density)
         losses[k, seed, 2] = temperature
         temperature_step(scalar, seed, temperature_rates[k], density, np.float32(-len(constants.half)))
-        update_targets(critic, seed, 2, constants.tau)
+        update_targets(critic, seed, chosen.shape[2], constants.tau)
 
 
 @njit(inline="always")
@@ -109,21 +111,24 @@ def _log_density(inner: np.float32, log_std: np.float32, noise: np.float32) -> n
 
 @njit(inline="always")
 def soft_policy_step(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, rate: np.ndarray, noise: np.ndarray,
-                     temperature: np.float32, constants: Constants, scratch: Scratch,
+                     temperature: np.float32, averaged: bool, constants: Constants, scratch: Scratch,
                      density: np.ndarray) -> np.float32:
     """Make a step of a seed's actor against `losses.soft_policy_loss`; return it, and fill the densities [B]."""
     batch, pair, actions = len(rows), critic.shape.sizes[0], len(constants.half)
     run_actor(actor, actor.weights, seed, rows, 0, pair, scratch)
     draw_actions(actor, noise, pair, constants, scratch, density)
-    least_values(critic, critic.weights, seed, scratch)
+    copies = len(scratch.critic_activations)
+    least_values(critic, critic.weights, seed, np.ones(copies, np.bool_), scratch)
+    if averaged:
+        average_values(critic, scratch)
     loss, part, two = np.float32(0.0), np.float32(1.0 / batch), np.float32(2.0)
     for item in range(batch):
         loss += temperature * density[item] - scratch.values[item]
     place = nets.outputs_offset(actor.shape, batch)
     for i in range(batch * 2 * actions):
         scratch.actor_grads[place + i] = np.float32(0.0)
-    for twin in range(len(scratch.critic_activations)):
-        _add_least_gradient(twin, seed, actor, critic, constants, scratch)
+    for copy in range(copies):
+        _add_value_gradient(copy, seed, actor, critic, averaged, constants, scratch)
     for item in range(batch):
         for a in range(actions):
             squashed, free = scratch.actor_activations[place + a], scratch.actor_activations[place + actions + a]
@@ -140,19 +145,21 @@ def soft_policy_step(rows: np.ndarray, seed: int, actor: Stack, critic: Stack, r
 
 
 @njit(inline="always")
-def _add_least_gradient(twin: int, seed: int, actor: Stack, critic: Stack, constants: Constants,
+def _add_value_gradient(copy: int, seed: int, actor: Stack, critic: Stack, averaged: bool, constants: Constants,
                         scratch: Scratch) -> None:
-    """Add the derivative of -values by the squashed actions, where this critic has the least one.
+    """Add the derivative of -values by the squashed actions: this critic's part of the mean, or where it has the least.
 
     It is added to the gradients of the actor's outputs, where the means are.
     """
+    copies = len(scratch.critic_activations)
+    part = np.float32(-1.0 / (len(scratch.values) * (copies if averaged else 1)))
     batch, pair, actions = len(scratch.values), critic.shape.sizes[0], len(constants.half)
     out, place = nets.outputs_offset(critic.shape, batch), nets.outputs_offset(actor.shape, batch)
     for item in range(batch):
-        chosen = scratch.least[item] == twin
-        scratch.critic_grads[out + item] = np.float32(-1.0 / batch) if chosen else np.float32(0.0)
-    member = nets.Member(critic.total, twin * (critic.total // len(scratch.critic_activations)) + seed)
-    nets.backward(critic.shape, critic.weights, member, scratch.critic_activations[twin], scratch.critic_grads, batch,
+        counts = averaged or scratch.least[item] == copy
+        scratch.critic_grads[out + item] = part if counts else np.float32(0.0)
+    member = nets.Member(critic.total, copy * (critic.total // copies) + seed)
+    nets.backward(critic.shape, critic.weights, member, scratch.critic_activations[copy], scratch.critic_grads, batch,
                   np.empty(0, np.float32))
     for item in range(batch):
         for a in range(actions):

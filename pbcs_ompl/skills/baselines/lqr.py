@@ -142,6 +142,8 @@ def linear_models(model: ResettableModel, states: Array, controls: Array, deviat
     for chunk in np.array_split(begins, max(1, -(-len(begins) // CHUNK))):
         step, here = chunk.copy(), states[chunk]
         for _ in range(settings.depth):
+            if not len(step):  # the plan is shorter
+                break
             given = controls[step] + half * settings.disturbance * rng.standard_normal((len(step), len(half)))
             given = np.clip(given, model.action_low, model.action_high)
             counter.spend(len(step))

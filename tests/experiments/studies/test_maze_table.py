@@ -50,7 +50,7 @@ def test_a_world_as_the_thesis_describes_it(verdicts):
 
 def test_the_opposite_world(verdicts):
     records = table(lambda size, index: size < 4 and index < 9, lambda size, _: True, lambda size, _: size > 2,
-                    lambda size, _: size > 2, follow=lambda size, index: size < 4 and index < 8, follow_cost=50_000)
+                    lambda size, _: size > 2, follow=lambda size, index: size < 4 and index < 3, follow_cost=50_000)
     claims = verdicts(records)
     unlike = {"PB solves 2x2 mazes more often", "PBCS chains more skills"}
     too_few = {"DDPG alone solves some 2x2", "TD3 alone solves some 2x2", "PB regularly fails"}  # ten runs of each
@@ -65,14 +65,14 @@ def test_a_chain_that_took_more_than_the_others_had_is_not_held_against_them(ver
         claim = find(claims, f"PBCS solves more mazes than {label} (")
         assert claim.agrees is False
         assert claim.numbers["PBCS"]["successes"] == 0
-    assert find(claims, "95% of the mazes").agrees is True
+    assert find(claims, "70% of the mazes").agrees is True
 
 
 def test_four_runs_without_success_do_not_show_that_there_is_none(verdicts):
     records = [record(label, 2, index, False) for label in ("PBCS", "PB", "DDPG", "TD3") for index in range(4)]
     claims = verdicts(records)
     assert {text for text, claim in claims.items() if claim.agrees is not None} == {
-        text for text in claims if "95% of the mazes" in text or "PB regularly fails" in text}
+        text for text in claims if "70% of the mazes" in text or "PB regularly fails" in text}
     assert find(verdicts([*records, record("TD3", 2, 4, True)]), "TD3 alone solves some").agrees is True
 
 

@@ -192,6 +192,16 @@ def test_shipped_records_make_the_same_figures_and_claims_without_any_run(folder
     assert log(folder) == ["coin-5"]
 
 
+def test_a_part_of_the_runs_can_be_shipped_and_the_others_are_counted(folder, tmp_path, capsys):
+    run_study(find_study(str(folder)), out=tmp_path / "made", seeds=5)
+    (tmp_path / "made/runs/coin-1.json").unlink()
+    pack(tmp_path / "made")
+    result = run_study(find_study(str(folder)), out=tmp_path / "again", from_records=True)
+    assert (len(result.records), result.left_out) == (4, {"coin": 1})
+    assert main(["study", str(folder), "--from-records", "--out", str(tmp_path / "again")]) == 0
+    assert f"1 runs; pbcs study {folder} --out {tmp_path / 'again'} makes them" in capsys.readouterr().out
+
+
 def test_missing_and_damaged_shipped_records_are_named(folder, tmp_path, capsys):
     study = find_study(str(folder))
     with pytest.raises(InvalidOption, match="comes without records"):

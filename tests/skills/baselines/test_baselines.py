@@ -80,6 +80,14 @@ def test_linear_models_of_free_space_are_its_own(plan: Trajectory) -> None:
     assert counter.count == 30 * (10 * 3 + 2 + 1)
 
 
+def test_a_plan_may_be_shorter_than_the_rollouts() -> None:
+    model = pbcs_ompl.make("pbcs/Box-v0", {"goal": [4.0, 2.5]})
+    states, counter = np.array([[2.5, 2.5], [2.55, 2.5], [2.6, 2.5]]), Counter()
+    models = linear_models(model, states, np.tile([[0.05, 0.0]], (2, 1)), Deviation.along(states),
+                           LQRSettings(rollouts=8, depth=10), np.random.default_rng(0), counter)
+    assert (models.A.shape, models.B.shape, counter.count) == ((2, 2, 2), (2, 2, 2), 8 * (2 + 1))
+
+
 def test_deviations_of_angles_go_the_short_way_round() -> None:
     observations = np.array([[3.0, 0.0], [-3.0, 1.0], [-2.9, 9.0], [-2.8, 1.0]])
     deviation = Deviation.along(observations)

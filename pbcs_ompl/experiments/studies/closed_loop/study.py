@@ -9,6 +9,7 @@ import numpy as np
 
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.bridge.trajectory import Trajectory
+from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, Counter
 from pbcs_ompl.resettable import make
@@ -30,10 +31,10 @@ RULES = ("goal", "feature", "max_episode_steps")
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
     """One run for each method, seed and task: method by method, since the first ones are the cheapest."""
-    common, most = {key: sweep[key] for key in ("noise", "planner", "plan_transitions")}, "max_transitions"
+    common = {key: sweep[key] for key in ("noise", "planner", "plan_transitions")}
     return [{"name": f"{task}-{method}-{index}", "task": task, "method": method, "index": index,
-             "seed": sweep["first_seed"] + index, "episodes": budget["episodes"], **common, **options,
-             most: min(options[most], budget.get(most, options[most]))}
+             "seed": sweep["first_seed"] + index, **common,
+             **{key: value for key, value in (options | budget).items() if key not in ("seeds", "without")}}
             for method, budget in sweep["methods"].items() for index in range(min(seeds, budget["seeds"]))
             for task, options in sweep["tasks"].items() if method not in options.get("without", ())]
 
@@ -134,8 +135,8 @@ class _Timed:
         return action
 
 
-def _controller(method: str, task: _Task, budget: int) -> tuple[Controller | None, int]:
-    """Return a method's controller, None where training gave none, and the transitions that it took."""
+def _controller(method: str, task: _Task, budget: int) -> tuple[Controller | None, int | None]:
+    """Return a method's controller, None where training gave none, and the transitions that it took, if known."""
     counter = Counter()
     if method == "open-loop":
         return OpenLoop(task.plan.actions), 0
@@ -145,5 +146,8 @@ def _controller(method: str, task: _Task, budget: int) -> tuple[Controller | Non
     if method == "reverse-curriculum":
         trained = train_reverse_curriculum(task.model, task.plan, seed=task.seed, max_transitions=max(1, budget))
         return trained.chain(task.model.max_episode_steps).controller(), trained.trainer.counter.count
-    result = train(task.model, trajectory=task.plan, method=method, seed=task.seed, max_transitions=max(1, budget))
+    try:
+        result = train(task.model, trajectory=task.plan, method=method, seed=task.seed, max_transitions=max(1, budget))
+    except InvalidState:  # one step leaves the balls of radius 0.1 in which skills of PBCS begin
+        return None, None
     return None if result.chain is None else result.chain.controller(), result.train_transitions
