@@ -38,7 +38,10 @@ class Settings:
             check_range(name, getattr(self, name), holds(getattr(self, name)), expected)
 
     def _check_counts(self, *names: str) -> None:
-        self._check("at least 1", lambda value: value >= 1, *names)
+        self._check_at_least(1, *names)
+
+    def _check_at_least(self, least: float, *names: str) -> None:
+        self._check(f"at least {least:g}", lambda value: value >= least, *names)
 
     def _check_fractions(self, *names: str) -> None:
         self._check("within [0, 1]", lambda value: 0 <= value <= 1, *names)
@@ -145,8 +148,7 @@ class EpisodeSettings(Settings):
 
     def _check_ranges(self) -> None:
         self._check_counts("beta", "episodes_per_batch")
-        self._check("at least 0", lambda value: value >= 0, "max_steps", "steps_per_waypoint",
-                    "first_trials")
+        self._check_at_least(0, "max_steps", "steps_per_waypoint", "first_trials")
         self._check_fractions("epsilon", "test_epsilon")
         self._check_positive("updates_per_transition")
 
@@ -199,7 +201,7 @@ class PlanSettings(Settings):
 
     def _check_ranges(self) -> None:
         self._check_counts("observation_horizon")
-        self._check("at least 0", lambda value: value >= 0, "improve", "search_on", "preceding_waypoints")
+        self._check_at_least(0, "improve", "search_on", "preceding_waypoints")
 
 
 @dataclass(frozen=True)

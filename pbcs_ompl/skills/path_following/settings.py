@@ -63,9 +63,9 @@ class FollowSettings(PlannedSettings):
 
     def _check_ranges(self) -> None:
         self._check_positive("progress_reward")
-        self._check("at least 0", lambda value: value >= 0, "stray_cost", "effort_cost", "action_noise", "test_share")
+        self._check_at_least(0, "stray_cost", "effort_cost", "action_noise", "test_share")
         self._check_fractions("start_fraction", "retry_fraction", "averaging")
-        self._check("at least 1", lambda value: value >= 1, "longest_horizon", "stress")
+        self._check_at_least(1, "longest_horizon", "stress")
         self.gate.with_failures(self.stress)
         self._check_counts("session_lengths", "attempts")
 

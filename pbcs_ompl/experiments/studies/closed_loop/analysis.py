@@ -18,6 +18,8 @@ ENOUGH = 0.9
 """A method suffices for a task where at least this fraction of the executions with 10 % random actions succeeds."""
 NOISE = "0.1"
 SOURCE = "ours"
+COSTS = {"train_transitions": ",.0f", "cpu_seconds": ".1f", "ms_per_action": ".2g"}
+"""What the table has of the costs, and how."""
 APART = 0.25
 """By which the methods are drawn beside each other, in % of random actions."""
 
@@ -95,8 +97,9 @@ def _in_legend(method: str, records: Records) -> str:
 
 
 def _table(records: Records, tasks: list[str]) -> str:
+    """Return the table; "plans" are those for which the method suffices, of all."""
     levels = list(records[0]["evaluations"])
-    lines = ["| task | method | seeds | " + " | ".join(f"{100 * float(level):g} %" for level in levels)
+    lines = ["| task | method | plans | " + " | ".join(f"{100 * float(level):g} %" for level in levels)
              + " | transitions | CPU s | ms an action |",
              "|---|---|---|" + "---|" * len(levels) + "---|---|---|"]
     for task in tasks:
@@ -104,15 +107,15 @@ def _table(records: Records, tasks: list[str]) -> str:
             chosen = _of(records, task, method)
             if chosen:
                 rates = " | ".join("{} of {}".format(*successes(chosen, level)) for level in levels)
-                lines.append(f"| {task} | {_label(method, records)} | {len(chosen)} | {rates} | "
-                             f"{_median(chosen, 'train_transitions'):,.0f} | {_median(chosen, 'cpu_seconds'):.1f} | "
-                             f"{_median(chosen, 'ms_per_action'):.2f} |")
+                enough = sum(successes([record], NOISE)[0] >= ENOUGH * record["episodes"] for record in chosen)
+                costs = " | ".join(_median(chosen, key, form) for key, form in COSTS.items())
+                lines.append(f"| {task} | {_label(method, records)} | {enough} of {len(chosen)} | {rates} | {costs} |")
     return "\n".join(lines) + "\n"
 
 
-def _median(records: Records, key: str) -> float:
+def _median(records: Records, key: str, form: str) -> str:
     values = [record[key] for record in records if record[key] is not None]
-    return float(np.median(values)) if values else float("nan")
+    return format(float(np.median(values)), form) if values else ""
 
 
 def _planned(records: Records) -> Claim:
