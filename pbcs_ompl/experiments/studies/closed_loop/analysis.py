@@ -64,8 +64,8 @@ def _draw(records: Records, tasks: list[str], figures: Path) -> None:
         for index, method in enumerate(methods):
             chosen = _of(records, task, method)
             if chosen:
-                _draw_method(axes, chosen, (index - (len(methods) - 1) / 2) * APART, color=colour(index),
-                             label=_in_legend(method, records))
+                _draw_method(axes, chosen, (index - (len(methods) - 1) / 2) * APART, colour(index),
+                             _in_legend(method, records))
         axes.set(title=in_words(task), xlabel="% random actions", ylim=(-0.04, 1.04))
         axes.grid(alpha=0.3)
     for axes in panels[len(tasks):]:
@@ -75,14 +75,14 @@ def _draw(records: Records, tasks: list[str], figures: Path) -> None:
     publish(figure, figures / "closed-loop.png")
 
 
-def _draw_method(axes: Axes, records: Records, shift: float, **style: str) -> None:
+def _draw_method(axes: Axes, records: Records, shift: float, color: str, label: str) -> None:
     """Draw the successes of a method in one task, `shift` beside the fractions of random actions."""
     levels = list(records[0]["evaluations"])
     counts = [successes(records, level) for level in levels]
     rates = np.array([reached / total for reached, total in counts])
     bounds = np.array([wilson(*count) for count in counts]).T
     axes.errorbar([100 * float(level) + shift for level in levels], rates, np.abs(bounds - rates), fmt="o-", capsize=2,
-                  linewidth=1.2, markersize=4, **style)
+                  linewidth=1.2, markersize=4, color=color, label=label)
 
 
 def _in_legend(method: str, records: Records) -> str:
