@@ -188,9 +188,12 @@ class PlanSettings(Settings):
         preceding_waypoints: Waypoints before a start point from which random rollouts may begin (ours: as many as
             `rollout_steps`; with 0, training stalls at 52 % of a plan of Ex on MountainCarContinuous-v0, seed 0).
         improve: Transitions that may make a plan shorter after the search, for each transition of the search (ours).
+        search_on: Where these save less than a tenth of the steps of a plan of Rides, the search is repeated, and
+            continued by RidesSST with this many transitions for each one of it (ours; 0 for never).
     """
 
     improve: float = 0.0
+    search_on: float = 0.0
     remove_loops: bool = False
     relative_observations: bool = False
     observation_horizon: int = 10
@@ -198,7 +201,7 @@ class PlanSettings(Settings):
 
     def _check_ranges(self) -> None:
         self._check_counts("observation_horizon")
-        self._check_at_least(0, "improve", "preceding_waypoints")
+        self._check_at_least(0, "improve", "search_on", "preceding_waypoints")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ class FollowSettings(PlannedSettings):
     """Settings of the method "follow"; those of the groups `starts` and `plan`, but `improve`, have no meaning for it.
 
     A step is worth progress_reward * (its progress - stray_cost * how much further from the line it led, in steps)
-    - effort_cost * (mean square of the action, in [-1, 1]), and `episodes.success_reward` more at the end.
+    - effort_cost * (mean square of the action, in [-1, 1]), and `episodes.success_reward` more at the end, but as much
+    less where the environment terminates an episode elsewhere (ours: a crash is then worse than a stop).
 
     Attributes:
         line: The plan as a line, and how policies see it.

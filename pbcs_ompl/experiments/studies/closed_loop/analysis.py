@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.experiments.claims import FEWEST_PAIRS, Claim, rate
 from pbcs_ompl.experiments.task_names import in_words
-from pbcs_ompl.figures.canvas import colour, new_panels, publish
+from pbcs_ompl.figures.canvas import colour, legend_below, new_panels, publish
 
 Records = list[dict[str, Any]]
 COLUMNS = 3
@@ -65,27 +64,25 @@ def _draw(records: Records, tasks: list[str], figures: Path) -> None:
         for index, method in enumerate(methods):
             chosen = _of(records, task, method)
             if chosen:
-                _draw_method(axes, chosen, colour(index), (index - (len(methods) - 1) / 2) * APART)
-        axes.set(title=in_words(task), ylim=(-0.04, 1.04))
+                _draw_method(axes, chosen, (index - (len(methods) - 1) / 2) * APART, colour(index),
+                             _in_legend(method, records))
+        axes.set(title=in_words(task), xlabel="% random actions", ylim=(-0.04, 1.04))
         axes.grid(alpha=0.3)
     for axes in panels[len(tasks):]:
         axes.remove()
-    figure.supxlabel("% random actions")
     figure.supylabel("share of successful executions (95 % Wilson; those of one seed share a plan)")
-    handles = [Line2D([], [], marker="o", color=colour(index), label=_in_legend(method, records))
-               for index, method in enumerate(methods)]
-    figure.legend(handles=handles, loc="outside upper center", ncols=COLUMNS, frameon=False)
+    legend_below(figure)
     publish(figure, figures / "closed-loop.png")
 
 
-def _draw_method(axes: Axes, records: Records, shade: str, shift: float) -> None:
+def _draw_method(axes: Axes, records: Records, shift: float, color: str, label: str) -> None:
     """Draw the successes of a method in one task, `shift` beside the fractions of random actions."""
     levels = list(records[0]["evaluations"])
     counts = [successes(records, level) for level in levels]
     rates = np.array([reached / total for reached, total in counts])
     bounds = np.array([wilson(*count) for count in counts]).T
     axes.errorbar([100 * float(level) + shift for level in levels], rates, np.abs(bounds - rates), fmt="o-", capsize=2,
-                  linewidth=1.2, markersize=4, color=shade)
+                  linewidth=1.2, markersize=4, color=color, label=label)
 
 
 def _in_legend(method: str, records: Records) -> str:
