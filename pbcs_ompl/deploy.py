@@ -185,12 +185,11 @@ class _Actions:
 
     def of(self, controls: Array) -> NDArray[Any]:
         """Return the actions [B, *shape] for controls [B, A]; integers are rounded."""
-        first, last = self._first, self._last
-        if first.dtype.kind in "iub":
+        if self._first.dtype.kind in "iub":
             controls = np.floor(controls + 0.5)
         actions = np.minimum(np.maximum(controls, self._low), self._high)
-        if first.dtype != np.float64:
-            actions = np.minimum(np.maximum(actions.astype(first.dtype), first), last)
+        if self._first.dtype != np.float64:
+            actions = np.minimum(np.maximum(actions.astype(self._first.dtype), self._first), self._last)
         return actions.reshape(len(actions), *self._shape)
 
 
@@ -236,11 +235,10 @@ class _Follower:
         self.line: Array = arrays.get("line", np.empty((0, 2)))
         self._distances, self._firsts, self._entries = arrays["distances"], arrays["firsts"], arrays["entries"]
         self._unit, self._origin, self._scale = arrays["unit"], arrays["origin"], arrays["scale"]
-        self._patience, self._reach = words["patience"], np.arange(words["reach"] + 1)
-        self._pass_square, self._periods = arrays.get("pass_radius", np.inf) ** 2, arrays.get("periods")
-        sines = arrays.get("sines", np.full(len(self._unit), -1))
-        self._angles, self._sines = np.flatnonzero(sines >= 0), sines[sines >= 0]
-        self._own = np.where(sines >= 0, 0.0, self._unit)
+        self._patience, self._lost_after = words["patience"], words.get("lost_after") or np.inf
+        self._reach, self._pass_square = np.arange(words["reach"] + 1), arrays.get("pass_radius", np.inf) ** 2
+        sines, self._periods = arrays.get("sines", np.full(len(self._unit), -1)), arrays.get("periods")
+        self._angles, self._sines, self._own = np.flatnonzero(sines >= 0), sines[sines >= 0], self._unit * (sines < 0)
 
     def step(self, observations: Array, memory: Memory) -> Step:
         """Return what networks see [B, I], and which one acts [B]."""
@@ -265,8 +263,13 @@ class _Follower:
         return np.asarray(places - self._periods * turns)
 
     def _advance(self, places: Array, memory: Memory) -> Array:
-        """Move the pointers to the nearest points ahead, count the steps since they moved last; return `_near` them."""
+        """Move pointers to the nearest points ahead (of those passed, after a long wait); return what is near them."""
         pointer, stalled = memory["pointer"], memory["stalled"]
+        lost = np.flatnonzero(stalled >= self._lost_after)
+        if len(lost):
+            squares = np.add.reduce(np.square(self.line - self._near(places, pointer)[lost, None]), axis=2)
+            squares[np.arange(len(self.line)) > pointer[lost, None]] = np.inf
+            pointer[lost], stalled[lost] = squares.argmin(axis=1), -1
         squares = np.add.reduce(np.square(self._ahead(self._near(places, pointer), pointer, self._reach)), axis=2)
         later = squares[:, 1:]
         barred = (later > squares[:, :-1]) & (later > self._pass_square)
@@ -383,9 +386,8 @@ def _complex(vectors: Array) -> Complex:
 def _unit(vectors: Complex) -> Complex:
     """Return vectors of length 1; those along the x axis for vectors of no length."""
     lengths = np.abs(vectors)
-    if lengths.all():
-        return vectors / lengths
-    return np.where(lengths == 0.0, 1.0, vectors / np.where(lengths == 0.0, 1.0, lengths))
+    none = lengths == 0.0
+    return np.where(none, 1.0, vectors / np.where(none, 1.0, lengths)) if none.any() else vectors / lengths
 
 
 def _line_through(corners: Array, spacing: float) -> Array:

@@ -7,14 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pbcs_ompl.core.statistics import median_interval, wilson
-from pbcs_ompl.figures.canvas import colour, new_figure
+from pbcs_ompl.figures.canvas import colour, legend_below, new_figure
 
 Rates = Mapping[str, Mapping[str, tuple[int, int]]]
 """For each series the (successes, trials) of each group."""
 Values = Mapping[str, Mapping[str, Sequence[float]]]
 """For each series the values of each group."""
-LINE, KEY = 100, 8
-"""Letters of the legend across the figure, and those that a key takes."""
 
 
 def rates_figure(rates: Rates, *, title: str = "", xlabel: str = "", ylabel: str = "share of solved runs") -> Figure:
@@ -94,7 +92,4 @@ def _range(counts: Sequence[int]) -> str:
 def _finish(figure: Figure, axes: Axes, title: str, xlabel: str) -> None:
     axes.set_title(title, fontsize=10)
     axes.set_xlabel(xlabel)
-    labels = axes.get_legend_handles_labels()[1]
-    if labels:
-        columns = min(4, max(1, LINE // (max(map(len, labels)) + KEY)))
-        figure.legend(loc="outside lower center", ncols=columns, frameon=False, fontsize=9)
+    legend_below(figure)

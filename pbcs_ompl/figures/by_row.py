@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from pbcs_ompl.core.statistics import median_interval, wilson
 from pbcs_ompl.figures.by_group import Rates, Values
-from pbcs_ompl.figures.canvas import colour, new_panels
+from pbcs_ompl.figures.canvas import colour, legend_below, new_panels
 
 ROW_INCHES = 0.42
 
@@ -41,7 +41,7 @@ def rows_figure(rates: Mapping[str, Rates], values: Mapping[str, Values], *, tit
         axes.set_ylim(len(rows) - 0.4, -0.6)
         axes.grid(alpha=0.3)
     figure.suptitle(title, fontsize=10)
-    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    legend_below(figure)
     return figure
 
 

@@ -1,7 +1,7 @@
 """One style for all figures: sizes, fonts, colours; and writing a figure whole or not at all.
 
-Colours of categories are those of Okabe and Ito (2008), which the colour-blind can distinguish; quantities have one
-perceptual colour map.
+Colours of categories are those of Okabe and Ito (2008) and two more, which the colour-blind can distinguish; quantities
+have one perceptual colour map.
 """
 
 from contextlib import AbstractContextManager
@@ -15,12 +15,14 @@ from matplotlib.figure import Figure
 
 from pbcs_ompl.results.files import write_atomically
 
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4d4d4d", "#b8a800")
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4d4d4d", "#b8a800", "#882255")
 RED, GREEN, PURPLE, WALL = PALETTE[1], PALETTE[2], "#7b3294", "#3b3b3b"
 QUANTITIES = "viridis"
 """The colour map of quantities."""
 BAND = 0.18
 """How opaque the band of an interval is."""
+LETTERS, KEY = 14, 8
+"""Letters of a legend in an inch, and those that a key takes."""
 
 
 def style() -> AbstractContextManager[None]:
@@ -62,6 +64,19 @@ def new_panels(rows: int, columns: int, width: float | None = None, height: floa
                         layout="constrained")
         FigureCanvasAgg(figure)
         return figure, list(figure.subplots(rows, columns, squeeze=False, sharex="col" if share_x else "none").flat)
+
+
+def legend_below(figure: Figure) -> None:
+    """Put the legend of all axes below a figure, where it hides nothing, in as many columns as fit.
+
+    What has the same name in several axes is there once.
+    """
+    named = {label: handle for axes in figure.axes for handle, label in
+             zip(*axes.get_legend_handles_labels(), strict=True)}
+    if named:
+        columns = int(LETTERS * figure.get_figwidth()) // (max(map(len, named)) + KEY)
+        figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=max(1, min(4, columns)),
+                      frameon=False, fontsize=9)
 
 
 def save(figure: Figure, path: str | Path) -> Path:

@@ -1,17 +1,14 @@
 """Curves over training and slices of critics: what the diagnostics look like."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
-from pbcs_ompl.figures.canvas import BAND, QUANTITIES, RED, colour, new_panels
+from pbcs_ompl.figures.canvas import BAND, QUANTITIES, RED, colour, legend_below, new_panels
 
-FEW = 4
-"""More curves have their legend below, where it hides none of them."""
 HALF = 0.5
 """Where all rates but the first are above this one, the scale begins here."""
 ENLARGED, SMALLEST_SPAN = 0.02, 1e-3
@@ -44,12 +41,9 @@ def success_figure(panels: Mapping[str, Curves], *, title: str = "", xlabel: str
         axes.set_xlabel(xlabel)
         axes.set_title(words, fontsize=10)
         axes.grid(alpha=0.3)
-        if curves:
-            below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14), "ncols": 2}
-            place: dict[str, Any] = below if len(curves) > FEW else {"loc": "lower right"}
-            axes.legend(**place, frameon=True, framealpha=0.85, edgecolor="none", fontsize=9)
     grid[0].set_ylabel("share of solved seeds (95 % Wilson)")
     figure.suptitle(title, fontsize=10)
+    legend_below(figure)
     return figure
 
 

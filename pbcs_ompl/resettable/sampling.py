@@ -99,6 +99,15 @@ def roll_near(model: ResettableModel, state: Array, radius: float, count: int, r
     return found[:count]
 
 
+def random_walk(model: ResettableModel, steps: int, rng: np.random.Generator) -> Array:
+    """Return the states [steps + 1, D] of random steps from the start of seed 0, and from there again after an end."""
+    states = [model.initial_state(0)]
+    for control in rng.uniform(model.action_low, model.action_high, (steps, len(model.action_low))):
+        outcome = model.transition(states[-1][None], control[None])
+        states.append(model.initial_state(0) if outcome.ended[0] else outcome.states[0])
+    return np.array(states)
+
+
 def _roll(model: ResettableModel, states: Array, rng: np.random.Generator, most: int, counter: Counter) -> Array:
     """Return what `states` [B, D] become in 0 to `most` random steps each; ended episodes are left out."""
     steps = rng.integers(0, most + 1, len(states))

@@ -15,6 +15,7 @@ from pbcs_ompl.resettable.adapters.visited import VisitedEnv
 from pbcs_ompl.resettable.check import check_resettable
 from pbcs_ompl.resettable.make import make
 from pbcs_ompl.resettable.memory.exploration import SEEDS, Changes, episodes
+from pbcs_ompl.resettable.sampling import random_walk
 from pbcs_ompl.resettable.survey import MEMORY, OUT_OF_MEMORY, Record, nothing
 from pbcs_ompl.results.files import write_json
 
@@ -69,12 +70,7 @@ def randomness(env: Any) -> str:
 def restore_cost(model: Any) -> float:
     """Return the median microseconds of restoring one of the states of a short random walk."""
     rng = np.random.default_rng(0)
-    states = [model.initial_state(0)]
-    for _ in range(STATES):
-        outcome = model.transition(states[-1][None], rng.uniform(model.action_low, model.action_high)[None])
-        if outcome.ended[0]:
-            break
-        states.append(outcome.states[0])
+    states = random_walk(model, STATES, rng)
     costs: list[float] = []
     ends = time.perf_counter() + SECONDS
     while len(costs) < len(states) or time.perf_counter() < ends:

@@ -98,7 +98,7 @@ class ClassifierSettings(Settings):
         self._check_counts("samples", "hidden_units", "gradient_steps")
         self._check_positive("reach", "learning_rate")
         self._check_fractions("confidence")
-        self._check("at least 0", lambda value: value >= 0, "weight_decay")
+        self._check_at_least(0, "weight_decay")
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,7 +38,10 @@ class Settings:
             check_range(name, getattr(self, name), holds(getattr(self, name)), expected)
 
     def _check_counts(self, *names: str) -> None:
-        self._check("at least 1", lambda value: value >= 1, *names)
+        self._check_at_least(1, *names)
+
+    def _check_at_least(self, least: float, *names: str) -> None:
+        self._check(f"at least {least:g}", lambda value: value >= least, *names)
 
     def _check_fractions(self, *names: str) -> None:
         self._check("within [0, 1]", lambda value: 0 <= value <= 1, *names)
@@ -145,8 +148,7 @@ class EpisodeSettings(Settings):
 
     def _check_ranges(self) -> None:
         self._check_counts("beta", "episodes_per_batch")
-        self._check("at least 0", lambda value: value >= 0, "max_steps", "steps_per_waypoint",
-                    "first_trials")
+        self._check_at_least(0, "max_steps", "steps_per_waypoint", "first_trials")
         self._check_fractions("epsilon", "test_epsilon")
         self._check_positive("updates_per_transition")
 
@@ -186,9 +188,12 @@ class PlanSettings(Settings):
         preceding_waypoints: Waypoints before a start point from which random rollouts may begin (ours: as many as
             `rollout_steps`; with 0, training stalls at 52 % of a plan of Ex on MountainCarContinuous-v0, seed 0).
         improve: Transitions that may make a plan shorter after the search, for each transition of the search (ours).
+        search_on: Where these save less than a tenth of the steps of a plan of Rides, the search is repeated, and
+            continued by RidesSST with this many transitions for each one of it (ours; 0 for never).
     """
 
     improve: float = 0.0
+    search_on: float = 0.0
     remove_loops: bool = False
     relative_observations: bool = False
     observation_horizon: int = 10
@@ -196,7 +201,7 @@ class PlanSettings(Settings):
 
     def _check_ranges(self) -> None:
         self._check_counts("observation_horizon")
-        self._check("at least 0", lambda value: value >= 0, "improve", "preceding_waypoints")
+        self._check_at_least(0, "improve", "search_on", "preceding_waypoints")
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.agents.update import one_thread
-from pbcs_ompl.bridge.plan import plan
+from pbcs_ompl.bridge.plan import PlanResult, plan
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.bridge.verification import verify
 from pbcs_ompl.core.callbacks import code_of_others
@@ -27,13 +27,17 @@ from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.config import METHODS, TrainConfig
 from pbcs_ompl.skills.criterion import Outcome, judged
 from pbcs_ompl.skills.method import TrainingMethod, restore, write_checkpoint
-from pbcs_ompl.skills.settings import PlannedSettings
+from pbcs_ompl.skills.settings import PlannedSettings, PlanSettings
 from pbcs_ompl.skills.train_result import TrainResult
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
 
 FIRST_CHECKPOINT_SECONDS, CHECKPOINT_SECONDS = 3.0, 30.0
 """Wall time to the first checkpoint and between later ones; it does not change the result."""
+CONTINUED = {"Rides": "RidesSST"}
+"""The planner that finds what another one finds, and then continues its search for shorter plans."""
+SHORTER = 0.9
+"""The part of a plan's steps, at most, that is left where making it shorter is worth its transitions."""
 WARM_UP_ROWS = 256
 """Transitions of a first update."""
 
@@ -112,13 +116,17 @@ class Training:
         return trajectory, 0, None
 
     def _search(self) -> tuple[Trajectory | None, int, str | None]:
-        found = plan(self.model, self.config.planner, planner_kwargs=self.config.planner_kwargs,
-                     seed=self.seeds.child("plan").integer(), max_transitions=self.config.max_transitions,
-                     improve=self._allowance, on_progress=self._report_planning)
-        transitions = found.transitions + (found.improvement.transitions if found.improvement else 0)
+        settings = self.settings.plan if isinstance(self.settings, PlannedSettings) else PlanSettings()
+        found = self._searched(str(self.config.planner), self.config.planner_kwargs, settings.improve)
+        transitions = _made(found)
         if self.folder:
             config = read_toml(self.folder.path / CONFIG)
             self.folder.write_config(config | {"planner_kwargs": found.planner_settings})
+        if self._continues(found, settings.search_on, transitions):
+            further = self._searched(CONTINUED[found.planner], {}, settings.search_on, transitions)
+            transitions += _made(further)
+            if further.solved and _steps(further) < _steps(found):
+                found = further
         unverified = found.found and found.replay_ok is None
         if not (found.solved or unverified):
             reason = found.reason if found.found else "the planner found no path to the goal within the budget"
@@ -127,12 +135,19 @@ class Training:
             self._keep_plan(found.trajectory, transitions)
         return found.trajectory, transitions, None
 
-    @property
-    def _allowance(self) -> str:
-        """What making a plan shorter may use, for `plan`."""
-        settings = self.config.settings
-        share = settings.plan.improve if isinstance(settings, PlannedSettings) else 0.0
-        return f"{100 * share:g}%"
+    def _searched(self, planner: str, options: dict[str, Any], share: float, used: int = 0) -> PlanResult:
+        """Return a plan, made shorter with a share of the transitions of its search, after some are used."""
+        return plan(self.model, planner, planner_kwargs=options, seed=self.seeds.child("plan").integer(),
+                    max_transitions=self.config.max_transitions - used, improve=f"{100 * share:g}%",
+                    on_progress=self._report_planning)
+
+    def _continues(self, found: PlanResult, share: float, used: int) -> bool:
+        """Return whether the search continues: making the plan shorter saved little, and the budget allows it."""
+        shorter = found.improvement
+        return (share > 0.0 and found.solved and shorter is not None and shorter.after > SHORTER * shorter.before
+                and found.planner in CONTINUED and not self.config.planner_kwargs
+                and bool(np.isfinite([self.model.feature_low, self.model.feature_high]).all())
+                and used + (1.0 + share) * found.transitions < self.config.max_transitions)
 
     def _keep_plan(self, trajectory: Trajectory, transitions: int) -> None:
         if self.path:
@@ -273,6 +288,16 @@ class Training:
         return {"phase": "train", "transitions": trainer.counter.count, "updates": trainer.updates,
                 "covered": method.covered, "skills": len(method.skills), **trainer.latest,
                 "seconds": time.perf_counter() - self.began}
+
+
+def _made(found: PlanResult) -> int:
+    """Return the transitions of a search and of what made its plan shorter."""
+    return found.transitions + (found.improvement.transitions if found.improvement else 0)
+
+
+def _steps(found: PlanResult) -> float:
+    """Return the steps of a plan."""
+    return float("inf") if found.path_length is None else found.path_length
 
 
 def training_versions() -> dict[str, str]:

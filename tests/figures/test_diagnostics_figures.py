@@ -19,7 +19,7 @@ def test_success_is_drawn_with_its_interval(tmp_path):
     np.testing.assert_array_equal(axes.lines[0].get_ydata(), [0.0, 0.25, 0.5, 1.0])
     band = axes.collections[0].get_paths()[0].vertices[:, 1]
     assert (band.min(), band.max()) == pytest.approx((wilson(0, 4)[0], wilson(4, 4)[1]))
-    assert "N = 4" in axes.get_legend().get_texts()[0].get_text()
+    assert "N = 4" in figure.legends[0].get_texts()[0].get_text()
     assert save(figure, tmp_path / "success.png").stat().st_size > 5000
 
 

@@ -80,6 +80,7 @@ def _follower(chain: FollowChain) -> ControllerData:
     if line.periods is not None:
         arrays["periods"] = line.periods
     words = {"kind": "follower", "memory": {"pointer": 0, "stalled": -1}, "patience": view.patience,
+             "lost_after": view.lost_after,
              "reach": _reach(view.window, line.spacing), "spacing": line.spacing, "time_limit": chain.time_limit,
              "reset_seed": chain.reset_seed}
     return _with_networks(words, arrays, chain.policies, chain.environment, chain.actions, size)

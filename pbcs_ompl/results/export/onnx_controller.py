@@ -147,6 +147,7 @@ def _parts(graph: Graph, data: ControllerData, seen: str) -> str:
 def _follower(graph: Graph, data: ControllerData, seen: str, memory: dict[str, str], line: str) -> Step:
     arrays = data.arrays
     places = graph("Div", _shown(graph, data, seen), arrays["unit"])
+    memory = _found_again(graph, data, places, memory, line)
     pointer, stalled = _advanced(graph, data, _unwound(graph, data, places, memory["pointer"], line), memory, line)
     unwound = _unwound(graph, data, places, pointer, line)
     ahead = graph("Flatten", _ahead(graph, line, unwound, pointer, arrays["distances"]))
@@ -218,6 +219,22 @@ def _advanced(graph: Graph, data: ControllerData, places: str, memory: dict[str,
     pointer = graph("Squeeze", graph("GatherElements", candidates, nearest, axis=1), [1])
     stood = graph("Add", memory["stalled"], 1)
     return pointer, graph("Where", graph("Greater", pointer, memory["pointer"]), np.array(0), stood)
+
+
+def _found_again(graph: Graph, data: ControllerData, places: str, memory: dict[str, str], line: str) -> dict[str, str]:
+    """Return the memory; pointers that stood still for long are at the nearest point that they have passed."""
+    longest = data.words["lost_after"]
+    if not longest:
+        return memory
+    pointer = graph("Unsqueeze", memory["pointer"], [1])
+    away = graph("Sub", graph("Unsqueeze", line, [0]),
+                 graph("Unsqueeze", _unwound(graph, data, places, memory["pointer"], line), [1]))
+    squares = graph("ReduceSum", graph("Mul", away, away), [-1], keepdims=0)
+    numbers = graph("Range", np.array(0), graph("Add", _last(graph, line), 1), np.array(1))
+    nearest = graph("ArgMin", graph("Where", graph("Greater", numbers, pointer), np.inf, squares), axis=1, keepdims=0)
+    lost = graph("GreaterOrEqual", memory["stalled"], np.array(longest))
+    return {"pointer": graph("Where", lost, nearest, memory["pointer"]),
+            "stalled": graph("Where", lost, np.array(-1), memory["stalled"])}
 
 
 def _passable(graph: Graph, squares: str, data: ControllerData) -> str:

@@ -81,7 +81,7 @@ class FollowChain(TrainedController):
         if self.line.periods is not None:
             arrays["periods"] = self.line.periods
         structure = {"skills": [{"first": int(first)} for first in self.firsts], "spacing": self.line.spacing,
-                     "window": view.window, "patience": view.patience}
+                     "window": view.window, "patience": view.patience, "lost_after": view.lost_after}
         return ChainContent(structure, arrays, [SkillPolicy(policy, ObservationTransform.identity(view.size))
                                                 for policy in self.policies])
 
@@ -94,7 +94,7 @@ class FollowChain(TrainedController):
             ShownFeature.plain(entries))  # of older files
         view = LineView(shown, arrays["unit"],
                         ObservationTransform(arrays["origin"], arrays["scale"]), arrays["distances"],
-                        structure["window"], structure["patience"])
+                        structure["window"], structure["patience"], structure.get("lost_after", 0))
         return cls(policies=tuple(policy.actor for policy in policies),
                    firsts=tuple(place["first"] for place in structure["skills"]),
                    line=Line(arrays["points"], structure["spacing"], float(arrays.get("pass_radius", np.inf)),

@@ -163,7 +163,7 @@ class Follow:
         terminals = reached | after.terminated | (progress.stalled >= self.settings.line.patience)
         gains = after.gains - self.settings.stray_cost * after.strayed
         rewards = (self.settings.progress_reward * gains - self.settings.effort_cost * (actions ** 2).mean(axis=1)
-                   + trainer.settings.success_reward * reached)
+                   + trainer.settings.success_reward * (reached * 1.0 - (after.terminated & ~reached)))
         trainer.agent.add_transitions(inputs[None], actions[None], rewards[None], task.inputs(after.position)[None],
                                       terminals[None])
         self._steps += 1
@@ -297,8 +297,7 @@ class Follow:
     def _failures(self, relay: Relay, starts: Position, until: IndexArray, epsilon: float) -> Trouble:
         """Return where executions from some starts [N] fail; training begins there from now on."""
         tries = self.task.execute(relay, starts, until=until, epsilon=epsilon, max_steps=self._max_steps,
-                                  patience=4 * self.settings.line.patience, rng=self.trainer.rng,
-                                  counter=self.trainer.counter)
+                                  rng=self.trainer.rng, counter=self.trainer.counter)
         mine = np.flatnonzero(tries.retries.progress.pointers < self.state.end)
         if len(mine):
             self._retries = tries.retries[mine]

@@ -36,10 +36,23 @@ class Progress:
     def __getitem__(self, members: IndexArray) -> "Progress":
         return Progress(self.pointers[members], self.stalled[members])
 
-    def advanced(self, line: Line, features: Array, window: float) -> "Progress":
-        """Return the progress after a step that led to `features` [B, F]; see `Line.advance`."""
-        pointers = line.advance(features, self.pointers, window)
-        return Progress(pointers, np.where(pointers > self.pointers, 0, self.stalled + 1))
+    def advanced(self, line: Line, features: Array, window: float, lost_after: int = 0) -> "Progress":
+        """Return the progress after a step that led to `features` [B, F]; see `Line.advance`.
+
+        Args:
+            line: The line.
+            features: Where the executions are now.
+            window: The longest move of a pointer, a length.
+            lost_after: Steps without progress after which a pointer first goes back to the nearest point of those that
+                it has passed; 0 for never.
+        """
+        lost = (self.stalled >= lost_after) & (lost_after > 0)
+        before, waited = self.pointers, np.where(lost, -1, self.stalled)
+        if lost.any():
+            before = before.copy()
+            before[lost] = line.nearest(features[lost], before[lost])
+        pointers = line.advance(features, before, window)
+        return Progress(pointers, np.where(pointers > before, 0, waited + 1))
 
 
 class View(Protocol):
@@ -48,6 +61,11 @@ class View(Protocol):
     @property
     def window(self) -> float:
         """The longest move of a pointer in a step, a length of the line."""
+        ...
+
+    @property
+    def lost_after(self) -> int:
+        """Steps without progress after which a pointer goes back; 0 for never."""
         ...
 
     def features(self, observations: Array) -> Array:
@@ -75,6 +93,8 @@ class LineView:
         distances: How far the policy looks ahead along the line, lengths [K].
         window: The longest move of a pointer in a step, a length.
         patience: Steps without progress after which training gives up.
+        lost_after: Steps without progress after which a pointer goes back to the nearest point that it has passed, so
+            that the way from there is driven again; 0 for never.
     """
 
     shown: ShownFeature
@@ -83,6 +103,7 @@ class LineView:
     distances: Array
     window: float
     patience: int
+    lost_after: int = 0
 
     @property
     def size(self) -> int:
@@ -147,6 +168,8 @@ class Relay:
 class Follower(SideBySide):
     """Drives along a line: a pointer for each episode moves forward on it, and a policy sees where the line leads.
 
+    Where an episode makes no progress for long, its pointer goes back (`LineView.lost_after`).
+
     Where one policy does not lead to the end, others take over at fixed places of the line.
 
     Example:
@@ -184,7 +207,8 @@ class Follower(SideBySide):
         return self._relay.index(self.progress.pointers)
 
     def _act(self, observations: Array, members: IndexArray) -> Actions:
-        moved = self.progress[members].advanced(self.line, self._view.features(observations), self._view.window)
+        view = self._view
+        moved = self.progress[members].advanced(self.line, view.features(observations), view.window, view.lost_after)
         self.progress.pointers[members], self.progress.stalled[members] = moved.pointers, moved.stalled
-        inputs = self._view.inputs(observations, self.line, moved)
+        inputs = view.inputs(observations, self.line, moved)
         return self._actions.to_actions(self._relay.act(inputs, moved.pointers))

@@ -94,6 +94,18 @@ class Line:
         squares[:, 1:][np.logical_or.accumulate(barred, axis=1)] = np.inf
         return np.take_along_axis(candidates, squares.argmin(axis=1)[:, None], axis=1)[:, 0]
 
+    def nearest(self, features: Array, pointers: IndexArray) -> IndexArray:
+        """Return the pointers [B] of the nearest points of those up to `pointers` [B].
+
+        Args:
+            features: Where the executions are [B, F].
+            pointers: [B].
+        """
+        squares = ((self.points[None] - self.unwound(features, pointers)[:, None]) ** 2).sum(axis=2)
+        squares[np.arange(len(self.points)) > pointers[:, None]] = np.inf
+        nearest: IndexArray = squares.argmin(axis=1)
+        return nearest
+
     def ahead(self, features: Array, pointers: IndexArray, distances: Array) -> Array:
         """Return points of the line ahead of pointers, relative to where the executions are [B, K, F].
 

@@ -15,7 +15,8 @@ class FollowSettings(PlannedSettings):
     """Settings of the method "follow"; those of the groups `starts` and `plan`, but `improve`, have no meaning for it.
 
     A step is worth progress_reward * (its progress - stray_cost * how much further from the line it led, in steps)
-    - effort_cost * (mean square of the action, in [-1, 1]), and `episodes.success_reward` more at the end.
+    - effort_cost * (mean square of the action, in [-1, 1]), and `episodes.success_reward` more at the end, but as much
+    less where the environment terminates an episode elsewhere (ours: a crash is then worse than a stop).
 
     Attributes:
         line: The plan as a line, and how policies see it.
@@ -62,9 +63,9 @@ class FollowSettings(PlannedSettings):
 
     def _check_ranges(self) -> None:
         self._check_positive("progress_reward")
-        self._check("at least 0", lambda value: value >= 0, "stray_cost", "effort_cost", "action_noise", "test_share")
+        self._check_at_least(0, "stray_cost", "effort_cost", "action_noise", "test_share")
         self._check_fractions("start_fraction", "retry_fraction", "averaging")
-        self._check("at least 1", lambda value: value >= 1, "longest_horizon", "stress")
+        self._check_at_least(1, "longest_horizon", "stress")
         self.gate.with_failures(self.stress)
         self._check_counts("session_lengths", "attempts")
 

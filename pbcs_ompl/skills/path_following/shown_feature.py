@@ -9,6 +9,7 @@ from pbcs_ompl.core.callbacks import code_of_others
 from pbcs_ompl.core.errors import Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.types import Array, IndexArray
+from pbcs_ompl.resettable.sampling import random_walk
 
 WALK = 20
 """Steps of the random walk that shows whether the feature is observed."""
@@ -99,15 +100,11 @@ def observes_feature(model: ResettableModel) -> bool:
     Raises:
         CallbackFailed: the environment raised.
     """
-    rng = np.random.default_rng(0)
     with code_of_others("the environment"):
-        states = [model.initial_state(0)]
-        for control in rng.uniform(model.action_low, model.action_high, (WALK, len(model.action_low))):
-            outcome = model.transition(states[-1][None], control[None])
-            states.append(model.initial_state(0) if outcome.ended[0] else outcome.states[0])
-        observations = model.observe(np.array(states))
+        states = random_walk(model, WALK, np.random.default_rng(0))
+        observations = model.observe(states)
     try:
-        ShownFeature.of(model, np.array(states), observations)
+        ShownFeature.of(model, states, observations)
     except Mismatch:
         return False
     return True

@@ -18,6 +18,8 @@ from pbcs_ompl.skills.settings import Settings
 
 LOOKS = (1.0, 2.0, 4.0)
 """How far policies look ahead, in multiples of `LineSettings.look_ahead`."""
+MOST_LOST = 4
+"""How often executions may make no progress for as many steps as patience has, until they come further than before."""
 STEP_QUANTILE = 0.9
 """Of the movements in a step along a plan, the one that is the unit: a blow against a wall is larger than a step."""
 
@@ -34,7 +36,8 @@ class LineSettings(Settings):
         look_ahead: Policies see the line 1, 2 and 4 times this ahead (ours; with 2, fewer mazes were solved).
         window: The longest move of a pointer in a step (ours; with 8, fewer mazes were solved).
         pass_radius: A pointer passes points of the line within this distance only, see `Line` (ours).
-        patience: Steps without progress after which an episode has failed (ours; 20 and 40 were equal in mazes).
+        patience: Steps without progress after which an episode of training has failed, and a pointer goes back to the
+            nearest point of those that it has passed (ours; 20 and 40 were equal in mazes).
     """
 
     spacing: float = 0.5
@@ -158,7 +161,7 @@ class FollowTask:
         deviation = seen.std(axis=0)
         normaliser = ObservationTransform(seen.mean(axis=0), np.where(deviation > 1e-9, deviation, 1.0))
         view = LineView(shown, unit, normaliser, settings.look_ahead * np.array(LOOKS), settings.window,
-                        settings.patience)
+                        settings.patience, settings.patience)
         return cls(model, line, view, states, pointers, len(kept) - 1)
 
     def place(self, pointer: int) -> int:
@@ -178,7 +181,8 @@ class FollowTask:
         """Make one step with controls [B, A]."""
         outcome = self.model.transition(position.states, controls)
         observations = self.model.observe(outcome.states)
-        progress = position.progress.advanced(self.line, self.view.features(observations), self.view.window)
+        progress = position.progress.advanced(self.line, self.view.features(observations), self.view.window,
+                                              self.view.lost_after)
         gains = ((progress.pointers - position.progress.pointers) * self.line.spacing).astype(np.float64)
         after = Position(outcome.states, observations, progress)
         return FollowStep(after, gains, self._away(after) - self._away(position), outcome.success, outcome.terminated,
@@ -191,8 +195,8 @@ class FollowTask:
         return lengths
 
     def execute(self, relay: Relay, position: Position, *, until: IndexArray, epsilon: float, max_steps: int,
-                patience: int, rng: np.random.Generator, counter: Counter) -> Tries:
-        """Let policies act, in the model, until the goal, the end of the episode or of patience.
+                rng: np.random.Generator, counter: Counter) -> Tries:
+        """Let policies act, in the model, until the goal, the end of the episode, or until they are lost too often.
 
         Args:
             relay: The policies.
@@ -200,14 +204,13 @@ class FollowTask:
             until: Pointers at which they have succeeded without the goal [B].
             epsilon: Fraction of random actions.
             max_steps: Steps after which an execution has failed.
-            patience: Steps without progress after which it has.
             rng: Source of random actions.
             counter: Counts every transition.
 
         Raises:
             BudgetUsedUp: in the middle of the executions.
         """
-        pointers = position.progress.pointers.copy()
+        pointers, lost = position.progress.pointers.copy(), np.zeros(len(position.states), dtype=np.int64)
         success, alive, trail = np.zeros(len(pointers), dtype=np.bool_), np.arange(len(pointers)), []
         for _ in range(max_steps):
             trail.append((alive, position))
@@ -215,9 +218,11 @@ class FollowTask:
             controls = with_random_actions(self.model, controls, epsilon, rng)
             counter.spend(len(alive))
             after = self.step(position, controls)
-            pointers[alive] = after.position.progress.pointers
-            success[alive] = after.success | (pointers[alive] >= until[alive])
-            over = success[alive] | after.ended | (after.position.progress.stalled >= patience)
+            now = after.position.progress
+            lost[alive] = np.where(now.pointers > pointers[alive], 0, lost[alive] + (now.stalled >= self.view.patience))
+            pointers[alive] = np.maximum(pointers[alive], now.pointers)
+            success[alive] = after.success | (now.pointers >= until[alive])
+            over = success[alive] | after.ended | (lost[alive] >= MOST_LOST)
             going = np.flatnonzero(~over)
             alive, position = alive[going], after.position[going]
             if not len(alive):

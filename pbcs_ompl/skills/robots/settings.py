@@ -103,4 +103,4 @@ class RobotSettings(Settings):
         self._check_positive("progress_length")
         self._check_fractions("epsilon")
         self._check_counts("patience", "max_steps", "robots", "horizon", "test_transitions", "test_steps")
-        self._check("at least 0", lambda value: value >= 0, "progress_reward", "success_reward", "effort")
+        self._check_at_least(0, "progress_reward", "success_reward", "effort")

@@ -63,7 +63,7 @@ def follow_chain() -> Case:
     rng = np.random.default_rng(1)
     line = Line.through(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]]), 0.5, pass_radius=2.0)
     view = LineView(ShownFeature.plain(np.array([1, 0])), np.array([0.1, 0.1]),
-                    ObservationTransform(np.ones(2), np.full(2, 2.0)), np.array([1.0, 2.0, 4.0]), 2.0, 10)
+                    ObservationTransform(np.ones(2), np.full(2, 2.0)), np.array([1.0, 2.0, 4.0]), 2.0, 10, lost_after=3)
     policies = tuple(network(rng, view.size) for _ in range(3))
     walks = np.cumsum(rng.uniform(-0.02, 0.1, (20, 50, 2)), axis=0)
     return Case(FollowChain(policies, (0, 8, 20), line, view, np.zeros(2), MAZE, 200,
@@ -77,7 +77,7 @@ def turning_chain() -> Case:
     line = Line.through(np.array([[0.0, 0.0, 0.0], [10.0, 60.0, -90.0], [30.0, 160.0, 0.0]]), 0.5, 2.0,
                         np.array([0.0, turn, turn]) / 0.1)
     view = LineView(ShownFeature(np.array([1, 0, 2]), np.array([NO_SINE, NO_SINE, 3])), np.full(3, 0.1),
-                    ObservationTransform(np.ones(4), np.full(4, 2.0)), np.array([1.0, 2.0, 4.0]), 4.0, 10)
+                    ObservationTransform(np.ones(4), np.full(4, 2.0)), np.array([1.0, 2.0, 4.0]), 4.0, 10, lost_after=4)
     corners = line.points[::5][:, None] * 0.1 + rng.normal(scale=0.05, size=(len(line.points[::5]), 50, 3))
     x, one, other = np.moveaxis(corners[:20], 2, 0)
     walks = np.stack([np.mod(one + np.pi, turn) - np.pi, x, np.cos(other), np.sin(other)], axis=2)

@@ -108,6 +108,38 @@ def test_resuming_gives_the_same_bits(plan: Trajectory) -> None:
         np.testing.assert_array_equal(array, two.arrays[name], err_msg=name)
 
 
+def test_a_plan_that_moves_do_not_make_shorter_is_searched_for_further() -> None:
+    """A car turns on circles: making the plan of Rides shorter saves nothing, and RidesSST finds a shorter one."""
+    found = pbcs_ompl.train("pbcs/CarPark-v0", method="follow", seed=4, max_transitions=8000)
+    short = pbcs_ompl.train("pbcs/CarPark-v0", method="follow", seed=4, max_transitions=3000,
+                            settings={"search_on": 0.0})
+    assert found.trajectory is not None
+    assert short.trajectory is not None
+    assert (found.trajectory.planner, short.trajectory.planner) == ("RidesSST", "Rides")
+    assert found.trajectory.length < short.trajectory.length
+    first = short.plan_transitions / 1.5
+    assert found.plan_transitions == pytest.approx(4.5 * first, abs=3)
+
+
+def test_a_crash_costs_what_the_goal_is_worth() -> None:
+    model = make("pbcs/PlanarQuadrotor-v0")
+    states = np.array([model.initial_state(0)] * 3)
+    states[1:, 0] += [0.1, 0.2]
+    settings = FollowSettings().updated({"effort_cost": 0.0, "progress_reward": 1e-9, "success_reward": 7.0})
+    kind, spaces = load_agent("ddpg"), settings.agent_spaces(model)
+    trainer = SkillTrainer(lambda seed, horizon=1.0: kind(*spaces, settings=kind.settings_type.from_preset("fast"),
+                                                          seeds=(seed,), device="cpu"),
+                           Waypoints.of_plan(states, model, settings), settings.episodes, Counter(20_000),
+                           np.random.default_rng(0))
+    seen: list[tuple[np.ndarray, np.ndarray]] = []
+    add = trainer.agent.add_transitions
+    trainer.agent.add_transitions = lambda *rows: (seen.append(rows[2:5:2]), add(*rows))  # type: ignore
+    Follow(trainer, settings).step()
+    rewards, terminals = (np.concatenate([rows[part][0] for rows in seen]) for part in (0, 1))
+    assert set(np.rint(rewards[terminals]).tolist()) >= {-7.0}
+    np.testing.assert_allclose(rewards[~terminals], 0.0, atol=1e-6)
+
+
 def test_the_budget_binds_and_a_larger_one_continues(tmp_path: Path) -> None:
     planned = pbcs_ompl.plan("pbcs/Maze-v0", env_kwargs=MAZE, seed=0).trajectory
     short = pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=planned, method="follow", seed=0,

@@ -56,6 +56,21 @@ def test_it_drives_along_the_line_to_its_end() -> None:
     np.testing.assert_allclose(position[0], [1.0, 1.0], atol=0.1)
 
 
+def test_without_progress_the_pointer_goes_back_to_where_the_episode_is_and_no_further_than_it_came() -> None:
+    before = Progress(np.array([20, 20, 20, 8]), np.array([10, 9, 30, 10]))
+    places = np.array([[2.6, 0.1], [2.6, 0.1], [9.9, 0.0], [9.0, 0.0]])  # at points 5, 5, 20 and 18
+    for periods in (None, np.array([100.0, 0.0])):
+        line = Line(LINE.points, LINE.spacing, 1.0, periods)
+        for turns in [np.zeros(4)] if periods is None else [np.zeros(4), np.array([1.0, 0.0, -2.0, 0.0])]:
+            there = places + np.outer(turns, [100.0, 0.0])
+            after = before.advanced(line, there, 2.0, lost_after=10)
+            assert after.pointers.tolist() == [5, 20, 20, 12]
+            assert after.stalled.tolist() == [0, 10, 0, 0]
+    never = before.advanced(LINE, places, 2.0)
+    assert never.pointers.tolist() == [20, 20, 20, 12]
+    assert never.stalled.tolist() == [11, 10, 31, 0]
+
+
 def test_a_batch_is_as_many_single_episodes() -> None:
     rng = np.random.default_rng(0)
     walks = np.cumsum(rng.uniform(0.0, 0.1, (20, 3, 2)), axis=0)

@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.experiments.claims import FEWEST_PAIRS, Claim, rate
 from pbcs_ompl.experiments.task_names import in_words
-from pbcs_ompl.figures.canvas import colour, new_panels, publish
+from pbcs_ompl.figures.canvas import colour, legend_below, new_panels, publish
 
 Records = list[dict[str, Any]]
 COLUMNS = 3
@@ -18,6 +17,8 @@ ENOUGH = 0.9
 """A method suffices for a task where at least this fraction of the executions with 10 % random actions succeeds."""
 NOISE = "0.1"
 SOURCE = "ours"
+COSTS = {"train_transitions": ",.0f", "cpu_seconds": ".1f", "ms_per_action": ".2g"}
+"""What the table has of the costs, and how."""
 APART = 0.25
 """By which the methods are drawn beside each other, in % of random actions."""
 
@@ -63,27 +64,25 @@ def _draw(records: Records, tasks: list[str], figures: Path) -> None:
         for index, method in enumerate(methods):
             chosen = _of(records, task, method)
             if chosen:
-                _draw_method(axes, chosen, colour(index), (index - (len(methods) - 1) / 2) * APART)
-        axes.set(title=in_words(task), ylim=(-0.04, 1.04))
+                _draw_method(axes, chosen, (index - (len(methods) - 1) / 2) * APART, colour(index),
+                             _in_legend(method, records))
+        axes.set(title=in_words(task), xlabel="% random actions", ylim=(-0.04, 1.04))
         axes.grid(alpha=0.3)
     for axes in panels[len(tasks):]:
         axes.remove()
-    figure.supxlabel("% random actions")
     figure.supylabel("share of successful executions (95 % Wilson; those of one seed share a plan)")
-    handles = [Line2D([], [], marker="o", color=colour(index), label=_in_legend(method, records))
-               for index, method in enumerate(methods)]
-    figure.legend(handles=handles, loc="outside upper center", ncols=COLUMNS, frameon=False)
+    legend_below(figure)
     publish(figure, figures / "closed-loop.png")
 
 
-def _draw_method(axes: Axes, records: Records, shade: str, shift: float) -> None:
+def _draw_method(axes: Axes, records: Records, shift: float, color: str, label: str) -> None:
     """Draw the successes of a method in one task, `shift` beside the fractions of random actions."""
     levels = list(records[0]["evaluations"])
     counts = [successes(records, level) for level in levels]
     rates = np.array([reached / total for reached, total in counts])
     bounds = np.array([wilson(*count) for count in counts]).T
     axes.errorbar([100 * float(level) + shift for level in levels], rates, np.abs(bounds - rates), fmt="o-", capsize=2,
-                  linewidth=1.2, markersize=4, color=shade)
+                  linewidth=1.2, markersize=4, color=color, label=label)
 
 
 def _in_legend(method: str, records: Records) -> str:
@@ -95,8 +94,9 @@ def _in_legend(method: str, records: Records) -> str:
 
 
 def _table(records: Records, tasks: list[str]) -> str:
+    """Return the table; "plans" are those for which the method suffices, of all."""
     levels = list(records[0]["evaluations"])
-    lines = ["| task | method | seeds | " + " | ".join(f"{100 * float(level):g} %" for level in levels)
+    lines = ["| task | method | plans | " + " | ".join(f"{100 * float(level):g} %" for level in levels)
              + " | transitions | CPU s | ms an action |",
              "|---|---|---|" + "---|" * len(levels) + "---|---|---|"]
     for task in tasks:
@@ -104,15 +104,15 @@ def _table(records: Records, tasks: list[str]) -> str:
             chosen = _of(records, task, method)
             if chosen:
                 rates = " | ".join("{} of {}".format(*successes(chosen, level)) for level in levels)
-                lines.append(f"| {task} | {_label(method, records)} | {len(chosen)} | {rates} | "
-                             f"{_median(chosen, 'train_transitions'):,.0f} | {_median(chosen, 'cpu_seconds'):.1f} | "
-                             f"{_median(chosen, 'ms_per_action'):.2f} |")
+                enough = sum(successes([record], NOISE)[0] >= ENOUGH * record["episodes"] for record in chosen)
+                costs = " | ".join(_median(chosen, key, form) for key, form in COSTS.items())
+                lines.append(f"| {task} | {_label(method, records)} | {enough} of {len(chosen)} | {rates} | {costs} |")
     return "\n".join(lines) + "\n"
 
 
-def _median(records: Records, key: str) -> float:
+def _median(records: Records, key: str, form: str) -> str:
     values = [record[key] for record in records if record[key] is not None]
-    return float(np.median(values)) if values else float("nan")
+    return format(float(np.median(values)), form) if values else ""
 
 
 def _planned(records: Records) -> Claim:

@@ -10,7 +10,7 @@ from scipy.stats import t
 
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.experiments.claims import PAIRS, Claim, always, at_least, at_most, greater_apart, rate
-from pbcs_ompl.figures.canvas import BAND, colour, new_panels, publish
+from pbcs_ompl.figures.canvas import BAND, colour, legend_below, new_panels, publish
 
 LATE = 10
 """Episodes of the actor itself that say what has become of it; the thesis smooths over as many."""
@@ -116,10 +116,9 @@ def _draw(variants: dict[str, Variant], figures: Path) -> None:
         axes.set_xlabel("episodes of 1000 steps; those of the good policy are left out")
         axes.set_title(title, fontsize=10)
         axes.grid(alpha=0.3)
-        if axes.get_legend_handles_labels()[0]:
-            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, frameon=False, fontsize=9)
     panels[0].set_ylabel(f"return, mean of {LATE} episodes; band: 95 % (Student's t)")
     figure.suptitle("Sparse HalfCheetah", fontsize=10)
+    legend_below(figure)
     publish(figure, figures / "returns.png")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from pbcs_ompl.experiments.claims import Claim, greater, higher, no_higher, rate
 from pbcs_ompl.figures.by_group import draw_rates, draw_values
-from pbcs_ompl.figures.canvas import new_panels, publish
+from pbcs_ompl.figures.canvas import legend_below, new_panels, publish
 
 Records = list[dict[str, Any]]
 SOURCE = "[Matheron2020] 7.5"
@@ -108,7 +108,7 @@ def _draw(records: Records, figures: Path) -> None:
                                for size, columns in groups.items()}, ylabel=label, log=key != "skills")
         for axes in (rates, *values):
             axes.set_xlabel(f"{NAMES[parameter]}, usually {_usual(records, parameter):g}")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    legend_below(figure)
     figure.suptitle("PBCS without verification, one parameter changed (7.5)", fontsize=10)
     publish(figure, figures / "parameters.png")
 

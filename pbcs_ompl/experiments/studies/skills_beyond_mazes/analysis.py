@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.experiments.claims import Claim, at_least, no_higher, rate
+from pbcs_ompl.experiments.task_names import in_words
 from pbcs_ompl.figures.canvas import new_figure, publish
 
 OURS = "beyond [Matheron2020], which trains in 2-D mazes only"
@@ -60,11 +61,11 @@ def _draw(solved: dict[str, Any], tasks: dict[str, list[dict[str, Any]]], path: 
     low, high = np.array([numbers["wilson"] for numbers in solved.values()]).T
     axes.errorbar(rates, places, xerr=[np.maximum(rates - low, 0.0), np.maximum(high - rates, 0.0)], fmt="o", capsize=4)
     effort = {task: np.median([record["train_transitions"] for record in chosen]) for task, chosen in tasks.items()}
-    axes.set_yticks(places, [f"{task}\n{effort[task] / 1000:,.0f}k transitions" for task in solved], fontsize=8)
+    axes.set_yticks(places, [f"{in_words(task)} (N = {len(tasks[task])})\n{effort[task] / 1000:,.0f}k transitions"
+                             for task in solved], fontsize=8)
     axes.set_ylim(len(solved) - 0.5, -0.5)
     axes.set_xlim(-0.02, 1.02)
     axes.set_xlabel("share of solved seeds, 95 % Wilson interval")
     axes.grid(alpha=0.3)
-    counts = " or ".join(map(str, sorted({len(chosen) for chosen in tasks.values()})))
-    axes.set_title(f"PBCS beyond mazes, N = {counts}; median transitions of training", fontsize=10)
+    axes.set_title("PBCS beyond mazes; median transitions of training", fontsize=10)
     publish(figure, path)
