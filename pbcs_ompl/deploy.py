@@ -34,10 +34,8 @@ KEEP_SIDE = math.cos(math.pi / 3)
 """A side leads as long as the cosine of the angle between the line and its heading is at least this."""
 QUATERNION = np.array([3, 6, 4, 5])
 """Where an observation with a free joint has the w, z, x and y of the quaternion."""
-FALLEN = 0.5
-"""A robot whose z axis leans so that its cosine is smaller has fallen."""
-LARGEST = 10.0
-"""Bound of the inputs of a robot's network."""
+FALLEN = 0.5  # a robot has fallen whose z axis leans so that the cosine is smaller
+LARGEST = 10.0  # bound of the inputs of a robot's network
 
 
 def load(path: str | Path | None = None) -> "Controller":
