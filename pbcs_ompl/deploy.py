@@ -34,7 +34,7 @@ KEEP_SIDE = math.cos(math.pi / 3)
 """A side leads as long as the cosine of the angle between the line and its heading is at least this."""
 QUATERNION = np.array([3, 6, 4, 5])
 """Where an observation with a free joint has the w, z, x and y of the quaternion."""
-FALLEN = 0.5  # a robot has fallen whose z axis leans so that the cosine is smaller
+LEAN = np.array([0.5, -1.5, -1.5, 0.5])  # times a squared quaternion: below 0 from 60 degrees on
 LARGEST = 10.0  # bound of the inputs of a robot's network
 
 
@@ -160,8 +160,7 @@ class _Networks:
                 values *= layer[2]
                 values += layer[3]
             np.maximum(values, 0.0, out=values)
-        raw: NDArray[np.float32] = values @ weight + bias
-        return raw
+        return np.asarray(values @ weight + bias)
 
 
 def _layer(parts: list[NDArray[Any]]) -> list[NDArray[Any]]:
@@ -317,8 +316,8 @@ class _RobotFollower(_Follower):
     def controls(self, controls: Array, observations: Array, memory: Memory) -> Array:
         """Return the controls [B, A] of the robot for those of the side that leads; one that has fallen shakes."""
         turned = (controls[:, None] @ self._actions[memory["side"]])[:, 0]
-        fallen = self._frame.fallen(observations)
-        turned[fallen] = self._waves[memory["stalled"][fallen] % len(self._waves)]
+        if (fallen := self._frame.fallen(observations)).any():
+            turned[fallen] = self._waves[memory["stalled"][fallen] % len(self._waves)]
         return turned
 
     def _leading(self, headings: Complex, ahead: Complex, before: Indices) -> Indices:
@@ -358,8 +357,9 @@ class FreeJoint:
 
     def fallen(self, seen: Array) -> NDArray[np.bool_]:
         """Return in which observations [B, O] the z axis of the joint leans by more than 60 degrees."""
-        w, z, x, y = np.square(seen[:, QUATERNION]).T if self._heads else np.zeros((4, len(seen)))
-        return np.asarray(w + z - x - y < FALLEN * (w + x + y + z))
+        if not self._heads:
+            return np.zeros(len(seen), np.bool_)
+        return np.asarray(np.square(seen[:, 3:7]) @ LEAN < 0.0)
 
     def turned(self, seen: Array, turn: Complex) -> Array:
         """Return observations [B, O] in a world that is turned [B]; the place is left out."""

@@ -283,9 +283,9 @@ def _shaken(graph: Graph, data: ControllerData, seen: str, controls: str, stalle
     """Return controls [B, A], in which robots that have fallen shake."""
     if not data.words["speeds"]:
         return controls
-    w, x, y, z = (graph("Mul", part, part) for part in (graph.columns(seen, [entry]) for entry in range(3, 7)))
-    up, down = graph("Add", w, z), graph("Add", x, y)
-    fallen = graph("Less", graph("Sub", up, down), graph("Mul", graph("Add", up, down), deploy.FALLEN))
+    quaternion = graph.columns(seen, range(3, 7))
+    lean = graph("MatMul", graph("Mul", quaternion, quaternion), deploy.LEAN[:, None])
+    fallen = graph("Less", lean, 0.0)
     waves = data.arrays["waves"]
     return graph("Where", fallen, graph("Gather", waves, graph("Mod", stalled, len(waves)), axis=0), controls)
 
