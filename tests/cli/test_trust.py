@@ -89,10 +89,15 @@ def test_nothing_beside_a_folder_is_imported(stranger: Path) -> None:
     assert not (stranger / "PWNED").exists(), found.stderr
 
 
-def test_a_folder_that_is_trusted_may_name_modules(stranger: Path) -> None:
+def test_a_folder_that_is_trusted_may_name_modules(stranger: Path, capsys: pytest.CaptureFixture[str],
+                                                   monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.delitem(sys.modules, "evil", raising=False)
     write_toml(stranger / "run/config.toml", read_toml(stranger / "run/config.toml") | {"agent": "evil:A"})
     (stranger / "run/result.json").unlink()
-    assert "cannot load the agent 'evil:A'" in _run("train --resume run --trust").stderr
+    assert main(["train", "--resume", "run", "--trust"]) == 2
+    sys.modules.pop("evil", None)
+    assert "cannot load the agent 'evil:A'" in capsys.readouterr().err
     assert (stranger / "PWNED").exists()
 
 

@@ -68,10 +68,11 @@ def test_it_is_a_factory(entry):
 
 
 def test_it_solves_the_2x2_maze_and_its_path_replays(entry):
-    solved = 0
+    walks = getattr(entry, "__name__", "") == "RandomWalk"  # which rarely gets there
+    budget, solved = 10_000 if walks else BUDGET, 0
     for seed in range(1, 4):
-        status, count, states, controls, checked = search(entry, seed, BUDGET)
-        assert count <= BUDGET
+        status, count, states, controls, checked = search(entry, seed, budget)
+        assert count <= budget
         if status != ob.PlannerStatus.EXACT_SOLUTION:
             continue
         solved += 1
@@ -80,7 +81,7 @@ def test_it_solves_the_2x2_maze_and_its_path_replays(entry):
         assert np.array_equal(model.transition(states[:-1], controls).states, states[1:])
         assert model.transition(states[-2:-1], controls[-1:]).success[0]
         assert checked
-    assert solved >= (0 if getattr(entry, "__name__", "") == "RandomWalk" else 3)
+    assert solved >= (0 if walks else 3)
 
 
 def test_the_budget_is_kept(entry):

@@ -53,9 +53,16 @@ def test_every_verb_takes_every_form_of_an_environment(form: str, trained: Any) 
     assert pbcs_ompl.make(env, **options).spec == EnvSpec(ID, KWARGS)
     assert pbcs_ompl.check_resettable(env, **options).ok
     assert pbcs_ompl.evaluate(trained.chain, env, episodes=2, **options).episodes == 2
-    assert pbcs_ompl.compare(["Ex"], env, seeds=1, **options).rows[0]["solved"] == 1
     again = pbcs_ompl.train(env, trajectory=found.trajectory, seed=1, max_transitions=500, **options)
     assert (again.solved, again.plan_transitions) == (False, 0)
+
+
+def test_compare_takes_every_form_of_an_environment() -> None:
+    mazes: list[dict[str, Any]] = [KWARGS | {"maze_seed": seed} for seed in range(4)]
+    environments = [ID, EnvSpec(ID, mazes[1]), gymnasium.make(ID, **mazes[2]), pbcs_ompl.make(ID, mazes[3])]
+    found = pbcs_ompl.compare(["Ex"], environments, env_kwargs=[mazes[0], {}, {}, {}], seeds=1)
+    assert [row["solved"] for row in found.rows] == [1, 1, 1, 1]
+    assert len({row["environment"] for row in found.rows}) == 4
 
 
 def test_not_solved_is_a_field() -> None:

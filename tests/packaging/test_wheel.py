@@ -87,12 +87,11 @@ def test_a_project_with_its_own_envs_and_planners(python: Path, project: Path) -
     where = run(python, project, "-c", "import pbcs_ompl, envs, planners; print(pbcs_ompl.__file__, envs.mine)")
     assert str(python.parents[1]) in where
     pbcs = (str(python.parent / "pbcs"),)
-    words = (*pbcs, "plan", "--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 2}', "--json", "--out", "found")
+    words = (*pbcs, "plan", "--env", "pbcs/Maze-v0", "--env-kwargs", '{"size": 2}', "--planner", "RRTNH", "--json",
+             "--out", "found")  # a planner of which little is compiled: nothing is cached in a new installation
     assert json.loads(run(python, project, *words).splitlines()[-1])["replay_ok"]
-    code = ("import pbcs_ompl\n"
-            "for planner in ('Ex', 'KPIECE1'):\n"
-            "    assert pbcs_ompl.plan('pbcs/Maze-v0', planner, env_kwargs={'size': 2}).replay_ok\n")
-    run(python, project, "-c", code)
+    run(python, project, "-c", "import pbcs_ompl\n"
+        "assert pbcs_ompl.plan('pbcs/Maze-v0', 'KPIECE1', env_kwargs={'size': 2}).replay_ok")
 
 
 def test_the_studies_are_installed(python: Path, project: Path) -> None:

@@ -12,7 +12,7 @@ from pbcs_ompl.skills import resume, train, training
 from pbcs_ompl.skills.method import read_checkpoint
 
 OPTIONS = {"method": "plain", "seed": 0, "max_transitions": 30_000, "settings": {"beta": 5, "max_steps": 10},
-           "agent_settings": {"hidden": [8], "batch_size": 10}}
+           "agent_settings": {"hidden": [8, 8], "batch_size": 10}}
 
 
 @pytest.fixture

@@ -1,31 +1,18 @@
 """A training is a function of what its folder says: not of today's presets, and not silently of other versions."""
 
-import json
-import subprocess
-import sys
+import shutil
 
 import pytest
 
+from pbcs_ompl.agents import settings as agents
 from pbcs_ompl.core.env_spec import EnvSpec
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.results.files import read_toml, to_toml
-from pbcs_ompl.skills import resume, train
+from pbcs_ompl.skills import config, resume, settings, train
 from pbcs_ompl.skills.training import training_versions
 
 MAZE = {"size": 2}
 OPTIONS = {"method": "pbcs", "env_kwargs": MAZE, "seed": 1}
-CHANGED_PRESETS = """
-import json, sys
-from pbcs_ompl.agents import settings as agents
-from pbcs_ompl.skills import config, settings as skills
-skills_before, agents_before = skills.read_preset("fast"), agents._read_preset("fast")
-changed = skills_before | {"version": 99, "common": skills_before["common"] | {"radius": 0.3, "beta": 20}}
-config.read_preset = skills.read_preset = lambda name: changed
-agents._read_preset = lambda name: agents_before | {"version": 99, "common": {"hidden": [8], "discount": 0.5}}
-assert config.method_settings("pbcs").starts.radius == 0.3
-from pbcs_ompl.skills import resume
-print(json.dumps(resume(sys.argv[1]).summary()))
-"""
 
 
 class Stop:
@@ -56,12 +43,19 @@ def whole(tmp_path_factory):
     return train("pbcs/Maze-v0", **OPTIONS, out=folder), folder
 
 
-@pytest.fixture
-def stopped(tmp_path):
+@pytest.fixture(scope="module")
+def half(tmp_path_factory):
     """The folder of the same training, stopped in the middle."""
+    folder = tmp_path_factory.mktemp("half") / "run"
     with pytest.raises(KeyboardInterrupt):
-        train("pbcs/Maze-v0", **OPTIONS, out=tmp_path / "run", on_progress=Stop(10))
-    return tmp_path / "run"
+        train("pbcs/Maze-v0", **OPTIONS, out=folder, on_progress=Stop(10))
+    return folder
+
+
+@pytest.fixture
+def stopped(half, tmp_path):
+    """A copy of that folder."""
+    return shutil.copytree(half, tmp_path / "run")
 
 
 def edit(folder, changes):
@@ -95,10 +89,15 @@ def test_a_second_run_from_a_folder_gives_the_same_bits(whole, tmp_path):
     assert files(tmp_path / "again" / "chain") == files(folder / "chain")
 
 
-def test_presets_that_changed_since_do_not_matter(whole, stopped):
-    run = subprocess.run([sys.executable, "-c", CHANGED_PRESETS, str(stopped)], capture_output=True, text=True,
-                         check=True)
-    assert numbers(json.loads(run.stdout)) == numbers(whole[0].summary())
+def test_presets_that_changed_since_do_not_matter(whole, stopped, monkeypatch):
+    before, agents_before = settings.read_preset("fast"), agents._read_preset("fast")
+    changed = before | {"version": 99, "common": before["common"] | {"radius": 0.3, "beta": 20}}
+    for module in (settings, config):
+        monkeypatch.setattr(module, "read_preset", lambda name: changed)
+    monkeypatch.setattr(agents, "_read_preset", lambda name: agents_before | {
+        "version": 99, "common": {"hidden": [8], "discount": 0.5}})
+    assert config.method_settings("pbcs").starts.radius == 0.3
+    assert numbers(resume(stopped).summary()) == numbers(whole[0].summary())
     assert files(stopped / "chain") == files(whole[1] / "chain")
 
 

@@ -45,7 +45,7 @@ def test_observers_give_each_seed_what_it_gets_alone():
     model = make("pbcs/Toy1D-v0")
 
     def observed(seeds):
-        agent = DDPG(1, model.action_low, model.action_high, seeds=seeds, settings=DDPGSettings(hidden=(8,)))
+        agent = DDPG(1, model.action_low, model.action_high, seeds=seeds, settings=DDPGSettings(hidden=(8, 8)))
         return {name: observer(agent) for name, observer in DiagnosticBatch(model).observers().items()}
 
     together, alone = observed((1, 2)), observed((2,))

@@ -10,7 +10,7 @@ from pbcs_ompl.experiments.stacked_training import NEVER, LoopSettings, StackedT
 from pbcs_ompl.resettable import make
 
 TOY = make("pbcs/Toy1D-v0")
-SMALL = DDPGSettings(hidden=(8,), batch_size=10)
+SMALL = DDPGSettings(hidden=(8, 8), batch_size=10)
 
 
 def training(seeds, noise="epsilon-greedy", model=TOY, expert=None, observers=None, **changes):
