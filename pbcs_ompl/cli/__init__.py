@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from pbcs_ompl.cli.arguments import build_parser, parse
+from pbcs_ompl.cli.folders import check_exists
 from pbcs_ompl.cli.streams import OutputClosed, flush_output, print_error, survive_encodings
 from pbcs_ompl.core.collector import no_collection
 from pbcs_ompl.core.errors import MissingDependency, PbcsError
@@ -26,6 +27,7 @@ MOST_LETTERS = 100
 """Of a name that is shown."""
 OF_TRAINING = ("torch", "safetensors")
 """Libraries that only training and what it leads to need."""
+OF_FOLDERS = ("eval", "export", "distill", "view")
 WRONG_INPUT, OUR_MISTAKE, STOPPED, SIGPIPE = 2, 4, 128, 13
 
 
@@ -70,6 +72,8 @@ def _dispatch(words: list[str]) -> int:
         MissingDependency: it needs what only training needs, and that is not installed.
     """
     arguments = parse(build_parser(), words)
+    if arguments.verb in OF_FOLDERS:  # which import torch first
+        check_exists(arguments.dir)
     if _imports(arguments) and "" not in sys.path:
         sys.path.append("")  # `--planner my_module:MyPlanner` finds a module in the working directory
     try:

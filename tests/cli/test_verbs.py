@@ -117,6 +117,14 @@ def test_a_training_that_runs_out_of_budget_continues_with_a_larger_one(pbcs):
     assert result["solved"]
 
 
+@pytest.mark.parametrize("verb", ["eval", "export --to csv", "distill", "view"])
+def test_a_folder_that_does_not_exist_is_named_before_anything_is_imported(verb, pbcs, tmp_path, monkeypatch):
+    monkeypatch.setattr("pbcs_ompl.cli._import", None)
+    (tmp_path / "runs/car-chain").mkdir(parents=True)
+    assert pbcs(f"{verb} runs/car-chian") == (2, "", "pbcs: error: runs/car-chian does not exist; did you mean "
+                                                     "'runs/car-chain'?\n")
+
+
 def test_an_interrupted_training_says_how_to_go_on(pbcs, monkeypatch):
     def interrupt(*_, out, **__):
         out.mkdir()
