@@ -14,7 +14,8 @@ from pbcs_ompl.figures.canvas import colour, legend_below, new_panels, publish
 Records = list[dict[str, Any]]
 COLUMNS = 3
 ENOUGH = 0.9
-"""A method suffices for a task where at least this fraction of the executions with 10 % random actions succeeds."""
+"""A method suffices for a plan of which at least this fraction of the executions with 10 % random actions succeeds."""
+MOST = 0.5
 NOISE = "0.1"
 SOURCE = "ours"
 COSTS = {"train_transitions": ",.0f", "cpu_seconds": ".1f", "ms_per_action": ".2g"}
@@ -42,6 +43,11 @@ def successes(records: Records, noise: str) -> tuple[int, int]:
         total += record["episodes"]
         reached += 0 if found is None else round(found["success_rate"] * found["episodes"])
     return reached, total
+
+
+def plans(records: Records) -> tuple[int, int]:
+    """Return for how many plans a method suffices, and of how many."""
+    return sum(successes([record], NOISE)[0] >= ENOUGH * record["episodes"] for record in records), len(records)
 
 
 def _distinct(records: Records, key: str) -> list[str]:
@@ -104,9 +110,9 @@ def _table(records: Records, tasks: list[str]) -> str:
             chosen = _of(records, task, method)
             if chosen:
                 rates = " | ".join("{} of {}".format(*successes(chosen, level)) for level in levels)
-                enough = sum(successes([record], NOISE)[0] >= ENOUGH * record["episodes"] for record in chosen)
+                enough = "{} of {}".format(*plans(chosen))
                 costs = " | ".join(_median(chosen, key, form) for key, form in COSTS.items())
-                lines.append(f"| {task} | {_label(method, records)} | {enough} of {len(chosen)} | {rates} | {costs} |")
+                lines.append(f"| {task} | {_label(method, records)} | {enough} | {rates} | {costs} |")
     return "\n".join(lines) + "\n"
 
 
@@ -135,12 +141,12 @@ def _open_loop(records: Records, tasks: list[str]) -> Claim:
 
 
 def _suffices(method: str, records: Records, tasks: list[str]) -> Claim:
-    """Claim that a method is good enough in each task: the interval of its rate lies above the bar, or not below it."""
-    found = _rates(method, records, tasks)
-    above = [task for task, one in found.items() if one["wilson"][0] >= ENOUGH]
-    below = [task for task, one in found.items() if one["wilson"][1] < ENOUGH]
+    """Claim that a method suffices for most plans of each task: plans are counted; executions of one are alike."""
+    found = {task: rate(*plans(chosen)) for task in tasks for chosen in [_of(records, task, method)] if chosen}
+    above = [task for task, one in found.items() if one["wilson"][0] > MOST]
+    below = [task for task, one in found.items() if one["wilson"][1] < MOST]
     between = [task for task in found if task not in above + below]
     parts = (("above", above), ("below", below), ("not enough runs in", between))
-    return Claim(f"{_label(method, records)} suffices with 10 % random actions (at least 90 %) wherever it was run",
-                 False if below else True if found and not between else None, found or rate(0, 0), SOURCE,
-                 "; ".join(f"{name}: {', '.join(map(in_words, some))}" for name, some in parts if some))
+    return Claim(f"{_label(method, records)} suffices for most plans of each task, with 10 % random actions (intervals "
+                 "above one half)", False if below else True if found and not between else None, found or rate(0, 0),
+                 SOURCE, "; ".join(f"{name}: {', '.join(map(in_words, some))}" for name, some in parts if some))

@@ -54,6 +54,10 @@ def _failures(records: list[dict[str, Any]]) -> str:
     return "; ".join(failed)
 
 
+def _in_words(task: str) -> str:
+    return in_words(task.removesuffix(LEARNT)) + (", learnt sets" if task.endswith(LEARNT) else "")
+
+
 def _draw(solved: dict[str, Any], tasks: dict[str, list[dict[str, Any]]], path: Path) -> None:
     figure, axes = new_figure(7.2, 0.5 * len(solved) + 1.4)
     places = np.arange(len(solved))
@@ -61,7 +65,7 @@ def _draw(solved: dict[str, Any], tasks: dict[str, list[dict[str, Any]]], path: 
     low, high = np.array([numbers["wilson"] for numbers in solved.values()]).T
     axes.errorbar(rates, places, xerr=[np.maximum(rates - low, 0.0), np.maximum(high - rates, 0.0)], fmt="o", capsize=4)
     effort = {task: np.median([record["train_transitions"] for record in chosen]) for task, chosen in tasks.items()}
-    axes.set_yticks(places, [f"{in_words(task)} (N = {len(tasks[task])})\n{effort[task] / 1000:,.0f}k transitions"
+    axes.set_yticks(places, [f"{_in_words(task)} (N = {len(tasks[task])})\n{effort[task] / 1000:,.0f}k transitions"
                              for task in solved], fontsize=8)
     axes.set_ylim(len(solved) - 0.5, -0.5)
     axes.set_xlim(-0.02, 1.02)
