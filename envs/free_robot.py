@@ -5,7 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbcs_ompl.core.robot import Symmetry
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, BoolArray
+
+FALLEN = 0.5
+"""Below this cosine of the angle between the z axis of its root and the vertical a robot has fallen (ours)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +29,12 @@ class FreeRobot:
         w, x, y, z = observations[:, 3:7].T
         yaw: Array = np.arctan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)  # resets give no unit quaternions
         return yaw
+
+    def fallen(self, observations: Array) -> BoolArray:
+        """Return which robots lean by more than 60 degrees [B]."""
+        w, x, y, z = np.square(observations[:, 3:7]).T
+        leaning: BoolArray = w + z - x - y < FALLEN * (w + x + y + z)
+        return leaning
 
     def turned(self, observations: Array, angles: Array) -> Array:
         """Return observations [B, O] in a world that is turned; quaternions have w >= 0."""

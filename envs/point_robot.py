@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbcs_ompl.core.robot import Symmetry
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,6 +18,10 @@ class PointRobot:
     def heading(self, observations: Array) -> Array:
         """Return zeros [B]."""
         return np.zeros(len(observations))
+
+    def fallen(self, observations: Array) -> BoolArray:
+        """Return that none has fallen [B]."""
+        return np.zeros(len(observations), dtype=np.bool_)
 
     def turned(self, observations: Array, angles: Array) -> Array:
         """Return places [B, 2] turned by angles [B] about the origin."""

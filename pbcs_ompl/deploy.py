@@ -27,14 +27,15 @@ Complex = NDArray[np.complex128]
 Arrays = dict[str, NDArray[Any]]
 Words = dict[str, Any]
 Memory = dict[str, Indices]
+Step = tuple[Array, Indices]  # what networks see [B, I], and which of them acts [B]
 FORMAT = 1
 LAYER_NORM_EPSILON = 1e-5
 KEEP_SIDE = math.cos(math.pi / 3)
 """A side leads as long as the cosine of the angle between the line and its heading is at least this."""
 QUATERNION = np.array([3, 6, 4, 5])
 """Where an observation with a free joint has the w, z, x and y of the quaternion."""
-LARGEST = 10.0
-"""Bound of the inputs of a robot's network."""
+FALLEN = 0.5  # a robot has fallen whose z axis leans so that the cosine is smaller
+LARGEST = 10.0  # bound of the inputs of a robot's network
 
 
 def load(path: str | Path | None = None) -> "Controller":
@@ -63,10 +64,6 @@ def _rows(observations: Any, single: bool) -> Array:
         return np.concatenate([_rows(part, single) for part in observations], axis=1)
     rows = np.asarray(observations, dtype=np.float64)
     return rows.reshape(1 if single else len(rows), -1)
-
-
-Step = tuple[Array, Indices, Indices | None]
-"""What networks see [B, I], which of them acts [B], and the side of a robot that leads [B]."""
 
 
 class Controller:
@@ -122,10 +119,9 @@ class Controller:
         if observations.shape != expected:
             raise ValueError(f"observations of the shape {observations.shape}; expected {expected}: "
                              f"{', '.join(self.words['observation'])}")
-        inputs, chosen, side = self._kind.step(observations, self.memory)
-        controls = self._networks.act(inputs, chosen)
-        if side is not None and isinstance(self._kind, _RobotFollower):
-            controls = self._kind.turned_back(controls, side)
+        controls = self._networks.act(*self._kind.step(observations, self.memory))
+        if isinstance(self._kind, _RobotFollower):
+            controls = self._kind.controls(controls, observations, self.memory)
         actions = self._actions.of(controls)
         return actions[0] if self._single else actions
 
@@ -200,20 +196,18 @@ class _Chain:
 
     def __init__(self, words: Words, arrays: Arrays):
         self._origins, self._scales = arrays["origins"], arrays["scales"]
-        self._centers, self._weights, self._squares = (arrays[f"ball.{part}"] for part in
-                                                       ("centers", "weights", "squares"))
+        self._centers, self._weights, self._squares = (arrays[f"ball.{x}"] for x in ("centers", "weights", "squares"))
         self._owners, self._order = arrays["owners"], np.arange(len(self._origins))
         names = ("origin", "scale", "weights_1", "bias_1", "weights_2", "bias_2", "confidence")
-        self._classifiers = [[arrays[f"classifier{index}.{name}"] for name in names]
-                             for index in range(words["classifiers"])]
+        self._classifiers = [[arrays[f"classifier{k}.{name}"] for name in names] for k in range(words["classifiers"])]
 
     def step(self, observations: Array, memory: Memory) -> Step:
-        """Return what networks see [B, I], which one acts [B], and no side."""
+        """Return what networks see [B, I], and which one acts [B]."""
         skill = memory["skill"]
         if len(self._owners):
             outside = (~self._parts(observations)).astype(np.float64) @ self._owners
             np.maximum(skill, np.maximum.reduce(np.where(outside == 0.0, self._order, 0), axis=1), out=skill)
-        return (observations - self._origins[skill]) / self._scales[skill], skill, None
+        return (observations - self._origins[skill]) / self._scales[skill], skill
 
     def _parts(self, observations: Array) -> NDArray[np.bool_]:
         """Return which parts of entries [B, N] observations [B, O] lie in: balls, then classifiers."""
@@ -245,7 +239,7 @@ class _Follower:
         self._angles, self._sines, self._own = np.flatnonzero(sines >= 0), sines[sines >= 0], self._unit * (sines < 0)
 
     def step(self, observations: Array, memory: Memory) -> Step:
-        """Return what networks see [B, I], which one acts [B], and no side."""
+        """Return what networks see [B, I], and which one acts [B]."""
         places = observations[:, self._entries]
         if len(self._angles):
             places[:, self._angles] = np.arctan2(observations[:, self._sines], places[:, self._angles])
@@ -257,7 +251,7 @@ class _Follower:
         ahead = self._ahead(near, memory["pointer"], self._distances)
         inputs = np.concatenate([(observations - self._origin) / self._scale, ahead.reshape(len(ahead), -1),
                                  np.minimum(memory["stalled"][:, None] / self._patience, 1.0)], axis=1)
-        return inputs, np.searchsorted(self._firsts, memory["pointer"], side="right") - 1, None
+        return inputs, np.searchsorted(self._firsts, memory["pointer"], side="right") - 1
 
     def _near(self, places: Array, pointer: Indices) -> Array:
         """Return places [B, F] moved by whole periods to where they are nearest to the points of the pointers."""
@@ -295,15 +289,13 @@ class _RobotFollower(_Follower):
 
     def __init__(self, words: Words, arrays: Arrays):
         super().__init__(words, arrays)
-        sides, self._actions = arrays["side_observations"], arrays["side_actions"]
-        self._shape = sides.shape[:2]
-        self._all_sides = np.concatenate(list(sides)).T.copy()
-        self._frame = FreeJoint(words["speeds"])
+        sides, self._actions, self._waves = arrays["side_observations"], arrays["side_actions"], arrays["waves"]
+        self._shape, self._all_sides = sides.shape[:2], np.concatenate(list(sides)).T.copy()
         self._distances = np.append(self._distances, arrays["half"])  # where the leading side looks
-        self._body = np.delete(np.arange(self._shape[1]), self._entries)
+        self._frame, self._body = FreeJoint(words["speeds"]), np.delete(np.arange(self._shape[1]), self._entries)
 
     def step(self, observations: Array, memory: Memory) -> Step:
-        """Return what the network sees [B, I], that it acts [B], and the side that leads [B].
+        """Return what the network sees [B, I], and that it acts [B].
 
         Raises:
             ValueError: there is no line yet.
@@ -320,11 +312,14 @@ class _RobotFollower(_Follower):
         own = (ahead[:, :-1] * turn[:, None]).view(np.float64)
         body = (self._frame.turned(all_seen[rows, side], turn).take(self._body, axis=1) - self._origin) / self._scale
         inputs = np.concatenate([body, own, np.minimum(memory["stalled"][:, None] / self._patience, 1.0)], axis=1)
-        return np.minimum(np.maximum(inputs, -LARGEST), LARGEST), np.zeros(len(rows), np.int64), side
+        return np.minimum(np.maximum(inputs, -LARGEST), LARGEST), np.zeros(len(rows), np.int64)
 
-    def turned_back(self, controls: Array, side: Indices) -> Array:
-        """Return the controls [B, A] of the robot for those of the side that leads."""
-        return (controls[:, None] @ self._actions[side])[:, 0]
+    def controls(self, controls: Array, observations: Array, memory: Memory) -> Array:
+        """Return the controls [B, A] of the robot for those of the side that leads; one that has fallen shakes."""
+        turned = (controls[:, None] @ self._actions[memory["side"]])[:, 0]
+        fallen = self._frame.fallen(observations)
+        turned[fallen] = self._waves[memory["stalled"][fallen] % len(self._waves)]
+        return turned
 
     def _leading(self, headings: Complex, ahead: Complex, before: Indices) -> Indices:
         """Return which side looks along the line [B]: the one that did as long as it does well enough.
@@ -360,6 +355,11 @@ class FreeJoint:
             return np.ones(seen.shape[:-1], np.complex128)
         squares = np.square(_complex(seen.take(QUATERNION, axis=-1)))
         return _unit(squares[..., 0] + squares[..., 1])
+
+    def fallen(self, seen: Array) -> NDArray[np.bool_]:
+        """Return in which observations [B, O] the z axis of the joint leans by more than 60 degrees."""
+        w, z, x, y = np.square(seen[:, QUATERNION]).T if self._heads else np.zeros((4, len(seen)))
+        return np.asarray(w + z - x - y < FALLEN * (w + x + y + z))
 
     def turned(self, seen: Array, turn: Complex) -> Array:
         """Return observations [B, O] in a world that is turned [B]; the place is left out."""

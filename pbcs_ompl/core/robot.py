@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +42,10 @@ class Robot(Protocol):
 
     def heading(self, observations: Array) -> Array:
         """Return the directions [B] in which it looks, in radians from the x axis; 0 where it has none."""
+        ...
+
+    def fallen(self, observations: Array) -> BoolArray:
+        """Return which robots lie on the ground and should get up before they go on [B]; none where none can fall."""
         ...
 
     def turned(self, observations: Array, angles: Array) -> Array:

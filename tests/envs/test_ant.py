@@ -80,6 +80,10 @@ def test_a_fallen_ant_ends_the_episode_only_where_that_is_asked_for() -> None:
     states[3, 4:8] = [0.0, 1.0, 0.0, 0.0]  # on its back
     states[4, 4:8] = [np.cos(0.5), np.sin(0.5), 0.0, 0.0]  # leaning by one radian
     np.testing.assert_array_equal(healthy(states), [True, False, False, False, True])
+    for size in (1.0, 1.3):  # resets give no unit quaternions
+        states[:, 4:8] *= size
+        np.testing.assert_array_equal(env.robot.fallen(env.observe(states)), [False, False, False, True, False])
+    states[:, 4:8] /= 1.3
     broken = states.copy()
     broken[0, 20] = np.nan
     assert not healthy(broken)[0]

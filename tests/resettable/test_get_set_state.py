@@ -83,6 +83,9 @@ def test_a_robot_is_put_into_states_with_the_flag() -> None:
         def heading(self, observations: np.ndarray) -> np.ndarray:
             return np.zeros(len(observations))
 
+        def fallen(self, observations: np.ndarray) -> np.ndarray:
+            return np.zeros(len(observations), bool)
+
         def turned(self, observations: np.ndarray, angles: np.ndarray) -> np.ndarray:
             return observations
 

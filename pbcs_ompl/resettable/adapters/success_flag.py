@@ -131,7 +131,7 @@ class _FlaggedRobot:
     def __init__(self, robot: Robot):
         self._robot = robot
         self.place, self.symmetries = robot.place, robot.symmetries
-        self.heading, self.turned = robot.heading, robot.turned
+        self.heading, self.turned, self.fallen = robot.heading, robot.turned, robot.fallen
 
     def put(self, states: Array, places: Array, angles: Array) -> Array:
         """Return states [B, N + 1] with the robot moved and turned, none of them a success."""

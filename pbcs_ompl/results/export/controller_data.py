@@ -19,6 +19,7 @@ from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.path_following.shown_feature import NO_SINE
 from pbcs_ompl.skills.robots.follower import RobotFollower
+from pbcs_ompl.skills.robots.shaking import waves
 
 PROBES = 16
 """Observations by which a robot's own frame is recognised."""
@@ -93,7 +94,8 @@ def _robot(follower: RobotFollower, line: Line | None) -> ControllerData:
               "distances": _points(view.distances, follower.spacing),
               "half": _points(np.median(view.distances), follower.spacing),
               "side_observations": np.array([one.observation for one in robot.symmetries]),
-              "side_actions": np.array([one.action for one in robot.symmetries]), "pass_radius": np.array(np.inf)}
+              "side_actions": np.array([one.action for one in robot.symmetries]), "pass_radius": np.array(np.inf),
+              "waves": waves(follower.policy.action_low, follower.policy.action_high)}
     if line is not None:
         arrays["line"] = line.points
     words = {"kind": "robot follower", "memory": {"pointer": 0, "stalled": -1, "side": -1}, "patience": view.patience,
@@ -145,7 +147,7 @@ def _first_speed(robot: Robot, size: int) -> int:
     """
     rng = np.random.default_rng(0)
     seen, angles = rng.normal(size=(PROBES, size)), rng.uniform(-np.pi, np.pi, PROBES)
-    if not robot.heading(seen).any() and np.array_equal(
+    if not robot.heading(seen).any() and not robot.fallen(seen).any() and np.array_equal(
             np.delete(robot.turned(seen, np.zeros(PROBES)), robot.place, axis=1), np.delete(seen, robot.place, axis=1)):
         return 0
     for first in range(7, size - 1):
@@ -160,4 +162,5 @@ def _is_free_joint(robot: Robot, seen: Array, angles: Array, first: int) -> bool
     kind = deploy.FreeJoint(first)
     ours, theirs = (np.delete(rows, robot.place, axis=1) for rows in
                     (kind.turned(seen, np.exp(1j * angles)), robot.turned(seen, angles)))
-    return bool(np.allclose(np.angle(kind.heading(seen)), robot.heading(seen)) and np.allclose(ours, theirs))
+    return bool(np.allclose(np.angle(kind.heading(seen)), robot.heading(seen)) and np.allclose(ours, theirs)
+                and np.array_equal(kind.fallen(seen), robot.fallen(seen)))

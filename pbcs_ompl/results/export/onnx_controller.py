@@ -58,6 +58,7 @@ def onnx_model(data: ControllerData) -> Any:
     if words["kind"] == "robot follower":
         turn = graph("Gather", arrays["side_actions"], after["side"], axis=0)
         controls = graph("Squeeze", graph("MatMul", graph("Unsqueeze", controls, [1]), turn), [1])
+        controls = _shaken(graph, data, seen, controls, after["stalled"])
     shape = words["action"]["shape"]
     graph.output("action", _actions(graph, data, controls), (BATCH, *shape), arrays["first_action"].dtype)
     for name, value in after.items():
@@ -276,6 +277,17 @@ def _robot(graph: Graph, data: ControllerData, seen: str, memory: dict[str, str]
     inputs = graph("Concat", normal, view, _share(graph, data, stalled), axis=-1)
     bounded = graph("Min", graph("Max", inputs, -deploy.LARGEST), deploy.LARGEST)
     return bounded, graph("Mul", side, 0), {"pointer": pointer, "stalled": stalled, "side": side}
+
+
+def _shaken(graph: Graph, data: ControllerData, seen: str, controls: str, stalled: str) -> str:
+    """Return controls [B, A], in which robots that have fallen shake."""
+    if not data.words["speeds"]:
+        return controls
+    w, x, y, z = (graph("Mul", part, part) for part in (graph.columns(seen, [entry]) for entry in range(3, 7)))
+    up, down = graph("Add", w, z), graph("Add", x, y)
+    fallen = graph("Less", graph("Sub", up, down), graph("Mul", graph("Add", up, down), deploy.FALLEN))
+    waves = data.arrays["waves"]
+    return graph("Where", fallen, graph("Gather", waves, graph("Mod", stalled, len(waves)), axis=0), controls)
 
 
 def _leading(graph: Graph, data: ControllerData, seen: str, far: str, before: str) -> str:

@@ -21,6 +21,7 @@ from pbcs_ompl.results.schema import Limit, Positive, Table, check
 from pbcs_ompl.skills.path_following.follower import Progress
 from pbcs_ompl.skills.path_following.line import Line, erase_loops
 from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
+from pbcs_ompl.skills.robots.shaking import CYCLE, waves
 from pbcs_ompl.skills.robots.view import RobotView
 from pbcs_ompl.skills.robots.worlds import robot_of
 from pbcs_ompl.skills.side_by_side import SideBySide
@@ -49,6 +50,8 @@ class FollowerWords(TypedDict):
 class RobotController(SideBySide):
     """Drives episodes along one line: a pointer for each of them moves forward on it.
 
+    The policy acts as long as the robot stands; one that has fallen shakes, see `pbcs_ompl.skills.robots.shaking`.
+
     Attributes:
         progress: How far each episode has come [B].
 
@@ -63,6 +66,7 @@ class RobotController(SideBySide):
     def __init__(self, policy: Policy, view: RobotView, line: Line, actions: ActionMap,
                  entries: IndexArray | None = None):
         self._policy, self._view, self._actions, self._entries = policy, view, actions, entries
+        self._waves = waves(policy.action_low, policy.action_high)
         self.line = line
         self.reset()
 
@@ -77,6 +81,8 @@ class RobotController(SideBySide):
         self.progress.pointers[members], self.progress.stalled[members] = moved.pointers, moved.stalled
         self._sides[members] = sides
         controls = self._view.controls(self._policy.act(self._view.inputs(shown, self.line, moved, sides)), sides)
+        fallen = self._view.robot.fallen(shown)
+        controls[fallen] = self._waves[moved.stalled[fallen] % CYCLE]
         return self._actions.to_actions(controls)
 
 

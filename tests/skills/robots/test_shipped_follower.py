@@ -2,12 +2,14 @@
 
 import json
 
+import numpy as np
 import pytest
 
 import pbcs_ompl
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import UnknownName
 from pbcs_ompl.skills import RobotFollower, evaluate_follower
+from pbcs_ompl.skills.robots.shaking import CYCLE, waves
 
 pytest.importorskip("mujoco")
 
@@ -21,6 +23,32 @@ def ant() -> RobotFollower:
 def test_the_ant_walks_to_the_goal(ant: RobotFollower, options: dict) -> None:
     found = evaluate_follower(ant, "pbcs/AntMaze-v0", env_kwargs={**options, "threads": 1}, episodes=4)
     assert found.successes >= 3, found
+
+
+def test_an_ant_on_its_back_gets_up(ant: RobotFollower) -> None:
+    """It shakes as long as it has fallen; then its policy acts again."""
+    model, count = pbcs_ompl.make("pbcs/AntMaze-v0", {"integrator": "Euler", "threads": 1}), 8
+    states = np.array([model.initial_state(seed) for seed in range(count)])
+    states[:, 3], states[:, 4:8] = 0.4, [0.0, 1.0, 0.0, 0.0]
+    controller, up = ant.controller(ant.line_of(np.array([[2.0, 2.0], [2.0, 6.0]]))), np.zeros(count, bool)
+    controller.reset(count)
+    for step in range(400):
+        fallen = ant.view.robot.fallen(model.observe(states))
+        assert step > 0 or fallen.all()
+        controls = controller.act(model.observe(states))
+        swung = np.abs(controls[fallen]) == 1.0
+        assert swung.all()
+        states, up = model.transition(states, controls).states, up | ~fallen
+        if up.sum() >= 6:
+            return
+    pytest.fail(f"{up.sum()} of {count} got up")
+
+
+def test_no_two_joints_swing_together_for_long() -> None:
+    controls = waves(np.full(8, -1.0), np.full(8, 1.0))
+    together = controls.T @ controls / CYCLE
+    assert np.abs(together[~np.eye(8, dtype=bool)]).max() < 0.3
+    np.testing.assert_array_equal(np.abs(controls), 1.0)
 
 
 def test_its_training_is_recorded_and_none_of_its_worlds_is_in_the_tables(ant: RobotFollower) -> None:
