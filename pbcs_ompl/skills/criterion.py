@@ -11,7 +11,7 @@ from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.resettable.task import Task
-from pbcs_ompl.skills.evaluation import Evaluation, evaluate_chain
+from pbcs_ompl.skills.evaluation import Evaluation, execute_chain
 from pbcs_ompl.skills.settings import CriterionSettings
 from pbcs_ompl.skills.trained_controller import TrainedController
 
@@ -23,6 +23,15 @@ class Outcome(NamedTuple):
     nominal: Evaluation | None = None
     robust: Evaluation | None = None
     model_success_rate: float | None = None
+    transitions: int = 0
+    """Steps of the judge's executions."""
+
+    @property
+    def is_believed(self) -> bool:
+        """Whether the executions in the model do not contradict those in the environment."""
+        robust, believed = self.robust, self.model_success_rate
+        return robust is None or believed is None or (
+            robust.wilson[1] >= wilson(round(believed * robust.episodes), robust.episodes)[0])  # both are samples
 
 
 def judged(chain: TrainedController | None, trajectory: Trajectory | None, model: ResettableModel,
@@ -41,20 +50,25 @@ def judged(chain: TrainedController | None, trajectory: Trajectory | None, model
         done = trajectory is not None and not trajectory.length and verify(trajectory, model).solved
         return Outcome(None if done else "there is no skill")
     try:
-        nominal = evaluate_chain(chain, task, episodes=1, epsilon=0.0, seed=seed)
-        robust = evaluate_chain(chain, task, episodes=criterion.robust_episodes, epsilon=criterion.robust_epsilon,
-                                seed=seed)
+        once = execute_chain(chain, task, episodes=1, epsilon=0.0, seed=seed)
+        often = execute_chain(chain, task, episodes=criterion.robust_episodes, epsilon=criterion.robust_epsilon,
+                              seed=seed)
     except NotVerified as error:
         return Outcome(str(error))
     starts = np.repeat(chain.start[None], criterion.robust_episodes, axis=0)
     believed = chain.rollouts(model, starts, epsilon=criterion.robust_epsilon,
                               rng=SeedTree(seed).child("model evaluation").generator())
     rate = float(believed.success.mean())
-    return Outcome(failure(nominal, robust, rate, criterion), nominal, robust, rate)
+    outcome = Outcome(None, Evaluation.of(once, 0.0), Evaluation.of(often, criterion.robust_epsilon), rate,
+                      sum(execution.steps for execution in (*once, *often)))
+    return outcome._replace(reason=failure(outcome, criterion))
 
 
-def failure(nominal: Evaluation, robust: Evaluation, believed: float, criterion: CriterionSettings) -> str | None:
+def failure(outcome: Outcome, criterion: CriterionSettings) -> str | None:
     """Return why a complete training does not meet the criterion of a solved one; None when it does."""
+    nominal, robust, believed = outcome.nominal, outcome.robust, outcome.model_success_rate
+    if nominal is None or robust is None or believed is None:
+        return outcome.reason
     if nominal.success_rate == 1 and robust.success_rate >= criterion.robust_rate:
         return None
     if nominal.success_rate < 1:
@@ -63,7 +77,7 @@ def failure(nominal: Evaluation, robust: Evaluation, believed: float, criterion:
     else:
         found = (f"{robust.successes} of {robust.episodes} executions with {robust.epsilon:.0%} random actions "
                  f"succeed, expected {criterion.robust_rate:.0%}")
-    if robust.wilson[1] < wilson(round(believed * robust.episodes), robust.episodes)[0]:  # both are samples
+    if not outcome.is_believed:
         cut = robust.endings.get("truncated", 0)
         mostly = cut > (robust.episodes - robust.successes) / 2
         why = (f"{cut} were cut by the environment's limit of steps: shorten the plan (pbcs plan --improve), or "

@@ -133,6 +133,12 @@ def evaluate(controller: TrainedController | Controller,
 
 
 def evaluate_chain(chain: TrainedController, task: Task, *, episodes: int, epsilon: float, seed: int) -> Evaluation:
+    """Return the numbers of `execute_chain`."""
+    return Evaluation.of(execute_chain(chain, task, episodes=episodes, epsilon=epsilon, seed=seed), epsilon)
+
+
+def execute_chain(chain: TrainedController, task: Task, *, episodes: int, epsilon: float,
+                  seed: int) -> list[Execution]:
     """Execute a chain in fresh environments of a task; see `evaluate`.
 
     Args:
@@ -151,6 +157,5 @@ def evaluate_chain(chain: TrainedController, task: Task, *, episodes: int, epsil
     judge = Judge(*task)
     if chain.reset_seed is None:
         raise NotVerified("not verified: the chain was trained from a state that no reset leads to")
-    executions = judge.drive(chain.controller(), reset_seeds=[chain.reset_seed] * episodes, max_steps=chain.time_limit,
-                             epsilon=epsilon, seed=seed)
-    return Evaluation.of(executions, epsilon)
+    return judge.drive(chain.controller(), reset_seeds=[chain.reset_seed] * episodes, max_steps=chain.time_limit,
+                       epsilon=epsilon, seed=seed)

@@ -39,6 +39,11 @@ class TrainingMethod(Protocol):
     trainer: SkillTrainer
 
     @property
+    def refusals(self) -> int:
+        """How often the judge has refused a chain that was finished."""
+        ...
+
+    @property
     def done(self) -> bool:
         """Whether the skills lead from the start state to the goal."""
         ...
@@ -65,6 +70,10 @@ class TrainingMethod(Protocol):
     @property
     def longest_step(self) -> int:
         """The most transitions that the next step may take; a larger number where that is not known."""
+        ...
+
+    def refused(self) -> bool:
+        """Train on after the judge has refused a finished chain; return whether that is possible."""
         ...
 
     def chain(self, steps_per_skill: int) -> TrainedController | None:

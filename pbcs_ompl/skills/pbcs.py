@@ -124,6 +124,15 @@ class PBCS:
         episodes = self.trainer.settings
         return sys.maxsize if self.complete else 2 * episodes.beta * episodes.max_steps
 
+    @property
+    def refusals(self) -> int:
+        """How often training went on after the judge had refused the chain."""
+        return 0
+
+    def refused(self) -> bool:
+        """Return that training does not go on after the judge has refused the chain: it has ended by its own test."""
+        return False
+
     def chain(self, steps_per_skill: int) -> SkillChain | None:
         """Return the skills so far as a chain; None where there are none.
 

@@ -82,6 +82,15 @@ class SinglePolicy(ABC):
         """The most transitions that the next step may take: those of a session, and of drawing its start states."""
         return sys.maxsize if self.done else 2 * self.trainer.settings.beta * self.trainer.limit(0)
 
+    @property
+    def refusals(self) -> int:
+        """How often training went on after the judge had refused the chain."""
+        return 0
+
+    def refused(self) -> bool:
+        """Return that training does not go on after the judge has refused the chain: it has ended by its own test."""
+        return False
+
     def chain(self, steps_per_skill: int) -> SkillChain:
         """Return the policy as a chain of one skill.
 

@@ -100,7 +100,7 @@ class Training:
             method = self._method(trajectory, planned)
         except BudgetUsedUp:
             return self._finish(None, trajectory, planned, "the budget is used up before training begins")
-        return self._finish(method, trajectory, planned, self._train(method))
+        return self._finish(method, trajectory, planned, *self._judged_training(method, trajectory))
 
     def _plan(self, trajectory: Trajectory | None) -> tuple[Trajectory | None, int, str | None]:
         """Return the plan, the transitions it took, and why there is none to train along."""
@@ -188,6 +188,29 @@ class Training:
             return Waypoints.of_plan(trajectory.states, self.model, self.settings, trajectory.reset_seed)
         return Waypoints.at_start(self.config.seed, self.model, self.settings.starts)
 
+    def _judged_training(self, method: TrainingMethod, trajectory: Trajectory | None) -> tuple[str | None, Outcome]:
+        """Train; train on where the judge refuses the chain, and the model agrees, as long as the budget lasts.
+
+        The executions of a judge that is not the last one count as training; each has random actions of its own.
+
+        Returns:
+            Why training ended early, or None, and what it came to.
+        """
+        counter = method.trainer.counter
+        while (ended_early := self._train(method)) is None:
+            outcome = self._judge(method, trajectory)
+            if (outcome.reason is None or not outcome.is_believed or counter.left <= outcome.transitions
+                    or not method.refused()):
+                return None, outcome
+            counter.spend(outcome.transitions)
+        return ended_early, Outcome(ended_early)
+
+    def _judge(self, method: TrainingMethod | None, trajectory: Trajectory | None) -> Outcome:
+        chain = None if method is None else method.chain(self.settings.steps_per_skill)
+        times = 0 if method is None else method.refusals
+        seed = self.seeds.child(f"judge {times}").integer() if times else self.config.seed
+        return judged(chain, trajectory, self.model, self.settings.criterion, seed)
+
     def _train(self, method: TrainingMethod) -> str | None:
         """Step until the method is done; return why it ended early, or None."""
         stops: list[KeyboardInterrupt] = []
@@ -236,13 +259,13 @@ class Training:
         self.next_checkpoint = time.perf_counter() + CHECKPOINT_SECONDS
 
     def _finish(self, method: TrainingMethod | None, trajectory: Trajectory | None, planned: int,
-                ended_early: str | None) -> TrainResult:
+                ended_early: str | None, outcome: Outcome | None = None) -> TrainResult:
         seconds = time.perf_counter() - self.began
         if method is not None:
             self._report(method, last=True)
         chain = None if method is None else method.chain(self.settings.steps_per_skill)
-        outcome = Outcome(ended_early) if ended_early else judged(
-            chain, trajectory, self.model, self.settings.criterion, self.config.seed)
+        if outcome is None:
+            outcome = Outcome(ended_early) if ended_early else self._judge(method, trajectory)
         result = TrainResult(
             solved=outcome.reason is None, reason=outcome.reason, complete=ended_early is None, nominal=outcome.nominal,
             robust=outcome.robust, model_success_rate=outcome.model_success_rate, chain=chain, trajectory=trajectory,

@@ -24,7 +24,7 @@ from pbcs_ompl.resettable import make
 from pbcs_ompl.results.files import read_toml
 from pbcs_ompl.skills import Evaluation, SkillChain, resume, train
 from pbcs_ompl.skills.config import usual_method
-from pbcs_ompl.skills.criterion import failure
+from pbcs_ompl.skills.criterion import Outcome, failure
 from pbcs_ompl.skills.policy import policy_to_arrays
 from pbcs_ompl.skills.settings import CriterionSettings
 
@@ -284,10 +284,14 @@ def test_pbcs_solves_every_small_maze(size, record_property):
 def test_a_model_is_called_untrue_only_where_both_samples_say_so(successes, believed, untrue):
     nominal = Evaluation(1.0, wilson(1, 1), 1, 20.0, 0.0, {"goal": 1})
     robust = Evaluation(successes / 100, wilson(successes, 100), 100, 20.0, 0.1, {"goal": successes})
-    reason = failure(nominal, robust, believed, CriterionSettings())
+    outcome = Outcome(None, nominal, robust, believed)
+    assert outcome.is_believed != untrue
+    reason = failure(outcome, CriterionSettings())
     assert reason is not None
     assert reason.startswith(f"{successes} of 100 executions with 10% random actions succeed, expected 95%")
     assert ("not true" in reason) == untrue
     cut = replace(robust, endings={"goal": successes, "truncated": 100 - successes})
-    assert "not true" not in failure(nominal, cut, believed, CriterionSettings())
-    assert ("limit of steps" in failure(nominal, cut, believed, CriterionSettings())) == untrue
+    again = failure(outcome._replace(robust=cut), CriterionSettings())
+    assert again is not None
+    assert "not true" not in again
+    assert ("limit of steps" in again) == untrue

@@ -23,25 +23,27 @@ AHEAD = np.array([0.5, 0.25, 0.125, 0.0625, 0.0625])
 
 @dataclass(frozen=True)
 class ReverseCurriculumSettings:
-    """Settings of the reverse curriculum; those of RFCL.
+    """Settings of the reverse curriculum; those of RFCL, but for the time limit.
 
     Attributes:
         stride: States by which the frontier moves back.
         in_a_row: Successes in a row, from the frontier, after which it does.
         least_steps: Time limit of an episode that begins at the end of the plan.
-        slack: An episode from the state t of a plan of T steps has `least_steps` + (T - t) / `slack` steps.
+        slack: An episode from the state t of a plan of T steps has `least_steps` + (T - t) / `slack` steps. RFCL has 3,
+            for demonstrations that are slower than need be; but through a maze the shortest way is half of a plan.
         demonstrated: Transitions of the plan that are added with each of the agent's own: 1 is half and half.
         updates_per_transition: Gradient steps for each transition of the agent's own.
-        agent_settings: Settings of SAC that differ from the preset "fast".
+        agent_settings: Settings of SAC that differ from the preset "fast": ten critics, as in RLPD.
     """
 
     stride: int = 8
     in_a_row: int = 3
     least_steps: int = 16
-    slack: float = 3.0
+    slack: float = 1.0
     demonstrated: float = 1.0
     updates_per_transition: float = 0.5
-    agent_settings: dict[str, object] = field(default_factory=lambda: {"layer_norm": True, "discount": 0.99})
+    agent_settings: dict[str, object] = field(default_factory=lambda: {"critics": 10, "layer_norm": True,
+                                                                       "discount": 0.99})
 
 
 class ReverseCurriculum(SinglePolicy):
@@ -50,9 +52,9 @@ class ReverseCurriculum(SinglePolicy):
     Half of what the agent learns from is the plan. The reward is 1 in the goal and 0 elsewhere. Once the frontier is
     the start, the policy is tested there and training continues until every test episode succeeds.
 
-    Source: Tao et al. 2024, Reverse Forward Curriculum Learning, the reverse stage for one demonstration. Differs: two
-    critics instead of ten, of 64 units; the plan is mixed into one replay buffer; there is no forward stage, since
-    there is one start.
+    Source: Tao et al. 2024, Reverse Forward Curriculum Learning, the reverse stage for one demonstration. Differs:
+    networks of 64 units; a longer time limit (`slack`); the plan is mixed into one replay buffer; there is no forward
+    stage, since there is one start.
 
     Args:
         trainer: What trains the agent.

@@ -41,6 +41,7 @@ class FollowState:
         candidate: The pointer from which the best policy is tried next, in a split.
         passed: Whether the policies lead from the start to the goal.
         rounds: How often training has begun again.
+        refusals: How often the judge has refused the policies.
     """
 
     end: int
@@ -52,13 +53,15 @@ class FollowState:
     candidate: int = 0
     passed: bool = False
     rounds: int = 0
+    refusals: int = 0
 
 
 class Follow:
     """Trains one policy to move along the plan, from states all along it, until it passes a sequential test.
 
     A test executes the policy from the start once without noise and, if that succeeds, with random actions until the
-    sequential test has an answer: under stress until training has begun again, later without. Where the last test
+    sequential test has an answer: under stress until training has begun again or the judge has refused a policy that
+    passed (one that stalls is helped by random actions), later without. Where the last test
     without stress found failures, executions begin shortly before them and end shortly after them first: a policy that
     still fails there is refused for a fraction of the steps.
 
@@ -79,11 +82,11 @@ class Follow:
         self.members: list[Member] = []
         """Finished policies, in the order of execution."""
         self.best: Policy | None = None
-        self._train_to(self.task.line.last + 1, 0)
+        self._train_to(FollowState(self.task.line.last + 1))
 
-    def _train_to(self, end: int, rounds: int) -> None:
-        """Train a policy from the start to the pointer `end` from now on."""
-        self.state = FollowState(end, rounds=rounds)
+    def _train_to(self, state: FollowState) -> None:
+        """Train a policy from the start to the pointer `state.end` from now on."""
+        self.state = state
         self.best = None
         self._retries: Position | None = None
         self._trouble: Trouble | None = None
@@ -211,7 +214,7 @@ class Follow:
     def _test(self) -> None:
         """Test the policy from the start; keep it if it passes, or if it is the best so far."""
         state, policy, before = self.state, self._average, self.trainer.counter.count
-        stress = self.settings.stress if not state.rounds else 1.0
+        stress = 1.0 if state.rounds or state.refusals else self.settings.stress
         found = self._try(policy, 0, stress)
         if found.passed:
             self.members.insert(0, Member(0, policy))
@@ -248,7 +251,18 @@ class Follow:
     def _begin_again(self, end: int) -> None:
         rounds = self.state.rounds + 1
         self.trainer.restart(min(2.0 ** rounds, self.settings.longest_horizon))
-        self._train_to(end, rounds)
+        self._train_to(FollowState(end, rounds=rounds, refusals=self.state.refusals))
+
+    @property
+    def refusals(self) -> int:
+        """How often the judge has refused the policies."""
+        return self.state.refusals
+
+    def refused(self) -> bool:
+        """Train the first policy on, and test it without stress from now on."""
+        self.members.pop(0)
+        self.state = replace(self.state, passed=False, phase="train", refusals=self.state.refusals + 1)
+        return True
 
     @property
     def _window(self) -> int:

@@ -16,6 +16,7 @@ from pbcs_ompl.core.types import Counter
 from pbcs_ompl.resettable import make
 from pbcs_ompl.skills import load_chain, method_settings
 from pbcs_ompl.skills.agent_interface import load_agent
+from pbcs_ompl.skills.criterion import Outcome, judged
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.follow import Follow
@@ -24,6 +25,7 @@ from pbcs_ompl.skills.path_following.settings import FollowSettings
 from pbcs_ompl.skills.path_following.shown_feature import observes_feature
 from pbcs_ompl.skills.path_following.task import FollowTask, LineSettings, Position, around_last_progress, extended
 from pbcs_ompl.skills.path_following.verdict import Trouble, Verdict
+from pbcs_ompl.skills.train_result import TrainResult
 from pbcs_ompl.skills.trainer import SkillTrainer
 from pbcs_ompl.skills.waypoints import Waypoints
 
@@ -57,6 +59,34 @@ def method(states: np.ndarray, settings: FollowSettings | None = None, budget: i
                            Waypoints.of_plan(states, MODEL, chosen), chosen.episodes, Counter(budget),
                            np.random.default_rng(0))
     return Follow(trainer, chosen)
+
+
+def trained(plan: Trajectory, **options: Any) -> TrainResult:
+    return pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=plan, method="follow", seed=0, **options)
+
+
+def test_training_goes_on_where_the_judge_refuses_what_passed(plan: Trajectory, tmp_path: Path,
+                                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    seeds = list[int]()
+
+    def strict(chain: Any, trajectory: Any, model: Any, criterion: Any, seed: int) -> Outcome:
+        seeds.append(seed)
+        outcome = judged(chain, trajectory, model, criterion, seed)
+        return outcome._replace(reason="refused", transitions=1000) if seed == 0 else outcome
+
+    once = trained(plan)
+    monkeypatch.setattr("pbcs_ompl.skills.training.judged", strict)
+    result = trained(plan)
+    assert (once.solved, result.solved, result.complete) == (True, True, True)
+    assert len(set(seeds)) == len(seeds) == 2  # each judge has random actions of its own
+    assert result.train_transitions > once.train_transitions + 1000
+    refused = trained(plan, max_transitions=once.train_transitions + 900)  # too few for the judge's executions
+    assert (refused.solved, refused.complete, refused.reason) == (False, True, "refused")
+    stopped = trained(plan, max_transitions=result.train_transitions - 1, out=tmp_path / "run")
+    assert not stopped.complete
+    resumed = pbcs_ompl.resume(tmp_path / "run", max_transitions=result.train_transitions)
+    assert (resumed.solved, resumed.train_transitions) == (True, result.train_transitions)
+    assert resumed.robust == result.robust
 
 
 def test_a_saved_follower_acts_as_the_one_that_was_saved(folder: Path, tmp_path: Path) -> None:
