@@ -73,7 +73,7 @@ class TrainingMethod(Protocol):
         ...
 
     def refused(self) -> bool:
-        """Train on after the judge has refused a finished chain; return whether that is possible."""
+        """Continue training after the judge has refused a finished chain; return whether that is possible."""
         ...
 
     def chain(self, steps_per_skill: int) -> TrainedController | None:

@@ -126,11 +126,11 @@ class PBCS:
 
     @property
     def refusals(self) -> int:
-        """How often training went on after the judge had refused the chain."""
+        """How often training has continued after the judge had refused the chain."""
         return 0
 
     def refused(self) -> bool:
-        """Return that training does not go on after the judge has refused the chain: it has ended by its own test."""
+        """Return that training does not continue after the judge has refused the chain: it has ended by its own test."""
         return False
 
     def chain(self, steps_per_skill: int) -> SkillChain | None:

@@ -65,8 +65,8 @@ def trained(plan: Trajectory, **options: Any) -> TrainResult:
     return pbcs_ompl.train("pbcs/Maze-v0", env_kwargs=MAZE, trajectory=plan, method="follow", seed=0, **options)
 
 
-def test_training_goes_on_where_the_judge_refuses_what_passed(plan: Trajectory, tmp_path: Path,
-                                                              monkeypatch: pytest.MonkeyPatch) -> None:
+def test_training_continues_where_the_judge_refuses_what_passed(plan: Trajectory, tmp_path: Path,
+                                                                monkeypatch: pytest.MonkeyPatch) -> None:
     seeds = list[int]()
 
     def strict(chain: Any, trajectory: Any, model: Any, criterion: Any, seed: int) -> Outcome:
