@@ -130,7 +130,7 @@ class PBCS:
         return 0
 
     def refused(self) -> bool:
-        """Return that training does not continue after the judge has refused the chain: it has ended by its own test."""
+        """Return False: a training that has passed its own test is not continued."""
         return False
 
     def chain(self, steps_per_skill: int) -> SkillChain | None:
