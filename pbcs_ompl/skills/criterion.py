@@ -28,9 +28,9 @@ class Outcome(NamedTuple):
 
     @property
     def is_believed(self) -> bool:
-        """Whether the executions in the model do not contradict those in the environment."""
+        """Whether the judge has executed the chain, and executions in the model do not contradict it."""
         robust, believed = self.robust, self.model_success_rate
-        return robust is None or believed is None or (
+        return robust is not None and believed is not None and (
             robust.wilson[1] >= wilson(round(believed * robust.episodes), robust.episodes)[0])  # both are samples
 
 

@@ -17,6 +17,7 @@ from pbcs_ompl.resettable import make
 from pbcs_ompl.skills import load_chain, method_settings
 from pbcs_ompl.skills.agent_interface import load_agent
 from pbcs_ompl.skills.criterion import Outcome, judged
+from pbcs_ompl.skills.evaluation import Evaluation
 from pbcs_ompl.skills.method import Snapshot
 from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.follow import Follow
@@ -87,6 +88,21 @@ def test_training_continues_where_the_judge_refuses_what_passed(plan: Trajectory
     resumed = pbcs_ompl.resume(tmp_path / "run", max_transitions=result.train_transitions)
     assert (resumed.solved, resumed.train_transitions) == (True, result.train_transitions)
     assert resumed.robust == result.robust
+
+
+@pytest.mark.parametrize("believed", [None, 1.0])
+def test_training_ends_where_there_is_no_judge_or_the_model_is_untrue(plan: Trajectory, believed: float | None,
+                                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = list[int]()
+    robust = None if believed is None else Evaluation(0.5, (0.4, 0.6), 100, 20.0, 0.1)
+
+    def judge(chain: Any, trajectory: Any, model: Any, criterion: Any, seed: int) -> Outcome:
+        asked.append(seed)
+        return Outcome("no", None, robust, believed)
+
+    monkeypatch.setattr("pbcs_ompl.skills.training.judged", judge)
+    result = trained(plan)
+    assert (result.solved, result.reason, asked) == (False, "no", [0])
 
 
 def test_a_saved_follower_acts_as_the_one_that_was_saved(folder: Path, tmp_path: Path) -> None:
