@@ -108,7 +108,7 @@ def test_a_budget_that_ends_is_no_error_and_the_tree_is_kept(pbcs, tmp_path):
 
 
 def test_a_training_that_runs_out_of_budget_continues_with_a_larger_one(pbcs):
-    status, result, error = pbcs(f"train {MAZE} --max-transitions 1500 --out small --json")
+    status, result, error = pbcs(f"train {MAZE} --max-transitions 600 --out small --json")
     assert status == 1
     assert result["solved"] is False
     assert "pbcs train --resume small --max-transitions N" in error
