@@ -55,3 +55,11 @@ class Robot(Protocol):
     def put(self, states: Array, places: Array, angles: Array) -> Array:
         """Return states [B, D] with the robot moved to places [B, 2] and turned by angles [B] about itself."""
         ...
+
+
+PARTS = ("place", "symmetries", "heading", "fallen", "turned", "put")
+
+
+def missing_parts(robot: object) -> list[str]:
+    """Return what an attribute `robot` lacks of a `Robot`: environments call other things by that name."""
+    return [name for name in PARTS if not hasattr(robot, name)]

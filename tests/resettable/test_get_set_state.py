@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from pbcs_ompl.core.errors import InvalidOption, InvalidState, NotResettable
+from pbcs_ompl.core.errors import InvalidOption, InvalidState, Mismatch, NotResettable
 from pbcs_ompl.resettable import adapt, check_resettable
 from pbcs_ompl.skills.robots.worlds import robot_of
 
@@ -96,6 +96,16 @@ def test_a_robot_is_put_into_states_with_the_flag() -> None:
     model = adapt(type("Rolling", (Cart,), {"robot": Disc()})())
     put = robot_of(model).put(np.array([[0.5, 0.5, 1.0]]), np.ones((1, 2)), np.zeros(1))
     np.testing.assert_array_equal(put, [[1.5, 1.5, 0.0]])
+
+
+def test_an_attribute_that_is_called_robot_by_chance_does_no_harm() -> None:
+    class Arm:
+        place, battery = (0, 1), 0.5
+
+    model = adapt(type("Moving", (Cart,), {"robot": Arm()})())
+    assert len(model.initial_state(0)) == 3
+    with pytest.raises(Mismatch, match="has no symmetries, heading, fallen, turned, put; expected all of place"):
+        robot_of(model)
 
 
 def test_misspelt_attributes_are_reported() -> None:

@@ -6,7 +6,7 @@ import gymnasium
 import numpy as np
 
 from pbcs_ompl.core.errors import NotResettable
-from pbcs_ompl.core.robot import Robot
+from pbcs_ompl.core.robot import Robot, missing_parts
 from pbcs_ompl.core.types import Array, BoolArray
 from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.attributes import EnvAttributes
@@ -55,7 +55,8 @@ class SuccessFlagEnv(gymnasium.Env[Array, Array]):
         self.feature_periods = offers.feature_periods
         self.parallel_batch, self.perturb_by_rollouts = offers.parallel_batch, offers.perturb_by_rollouts
         self.walls, self.goal_circle = offers.walls, offers.goal_circle
-        self.robot = None if offers.robot is None else _FlaggedRobot(offers.robot)
+        robot = offers.robot
+        self.robot = robot if robot is None or missing_parts(robot) else _FlaggedRobot(robot)
         self.advance_towards = None if offers.advance_towards is None else self._advance_towards
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:

@@ -61,9 +61,9 @@ class Follow:
 
     A test executes the policy from the start once without noise and, if that succeeds, with random actions until the
     sequential test has an answer: under stress until training has begun again or the judge has refused a policy that
-    passed (one that stalls is helped by random actions), later without. Where the last test
-    without stress found failures, executions begin shortly before them and end shortly after them first: a policy that
-    still fails there is refused for a fraction of the steps.
+    passed (one that stalls is helped by random actions), later without. Where the last test without stress found
+    failures, executions begin shortly before them and end shortly after them first: a policy that still fails there is
+    refused for a fraction of the steps.
 
     After `attempts` failed tests the best policy is tested without stress. Where it fails, training begins again with
     new networks, longer sessions and a longer horizon. From then on the line is split first: the best policy is tried

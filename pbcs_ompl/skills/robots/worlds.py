@@ -8,7 +8,7 @@ import numpy as np
 
 from pbcs_ompl.core.errors import InvalidOption, Mismatch
 from pbcs_ompl.core.interfaces import ResettableModel
-from pbcs_ompl.core.robot import Robot
+from pbcs_ompl.core.robot import PARTS, Robot, missing_parts
 from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.resettable.attributes import EnvAttributes
@@ -38,12 +38,16 @@ def robot_of(model: ResettableModel) -> Robot:
     """Return the robot that an environment declares.
 
     Raises:
-        Mismatch: it declares none.
+        Mismatch: it declares none, or not all of one.
     """
     robot = EnvAttributes.of(model.env).robot
     if robot is None:
         raise Mismatch(f"{model.spec.id} declares no robot, so a policy cannot be trained for any line; give the "
                        "environment an attribute `robot` (see docs/environments.md), or train along one plan")
+    missing = missing_parts(robot)
+    if missing:
+        raise Mismatch(f"the robot of {model.spec.id} has no {', '.join(missing)}; expected all of "
+                       f"{', '.join(PARTS)} (see docs/environments.md)")
     return robot
 
 
