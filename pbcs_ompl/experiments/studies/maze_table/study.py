@@ -12,7 +12,7 @@ THESIS = "thesis"
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
-    """One run for each seed, size and method, seed by seed: PBCS first, and last, to the letter; a part is balanced."""
+    """One run for each seed, size and method, seed by seed: PBCS first, and last, by size, to the letter."""
     chosen = [{"name": f"{name.replace(', ', '-')}-{size}-{index}", "label": name, "size": int(size), "index": index,
                "seed": sweep["first_seed"] + index, "method": method["method"], "agent": method["agent"],
                "planner": method.get("planner"), "preset": method.get("preset", sweep["preset"]),
@@ -20,7 +20,12 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
                "wall_penalty": sweep["wall_penalty"]}
               for index in range(seeds) for size, options in sweep["sizes"].items()
               for name, method in sweep["methods"].items() if index < min(_seeds(method, size), options["seeds"])]
-    return sorted(chosen, key=lambda settings: (settings["preset"] == THESIS, settings["method"] != "pbcs"))
+    return sorted(chosen, key=_order)
+
+
+def _order(settings: dict[str, Any]) -> tuple[int, ...]:
+    literal = settings["preset"] == THESIS
+    return literal, settings["method"] != "pbcs", settings["size"] if literal else 0
 
 
 def _seeds(method: dict[str, Any], size: str) -> int:
