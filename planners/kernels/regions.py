@@ -165,7 +165,7 @@ def open_bin(regions: Regions, cell: NDArray[np.int64]) -> Number:
         inner = number
         for axis in range(features):
             cell[axis] >>= 1
-    rows[opened].start, rows[opened].size = take(pool, free, used, SMALLEST), SMALLEST
+    rows[opened].start, rows[opened].size = take(pool, free, used, np.int64(SMALLEST)), SMALLEST
     return opened
 
 

@@ -19,7 +19,7 @@ from pbcs_ompl.planners.kernels.ranking import REGIONS, lift, lowest
 from pbcs_ompl.planners.kernels.regions import REGIONS_TYPE, Regions, add_node, key_of, open_bin
 from pbcs_ompl.planners.kernels.runs import Members, Number, Rows
 
-SCALE, KIND, PATIENCE, ACTIVE, NODE, BIN, STEPS, DRY, KNOWN, GAINS = range(10)  # columns of `rides`
+SCALE, KIND, PATIENCE, ACTIVE, NODE, BIN, STEPS, DRY, KNOWN, GAINS = range(10)  # columns of `rides`; three questions
 KINDS, PATIENCES = 2, 6  # uniform and surface controls; 1, 2, 4, ... 32 steps
 OPENED, USED, WEIGHT = range(3)  # columns of `yields`
 NO_BIN: Number = np.int64(-1)
@@ -82,16 +82,16 @@ def _least_child(rows: Any, region: Number, uniform: float) -> Number:
 def _begin(rows: Any, order: Rows, runs: Any, tails: Rows, totals: NDArray[np.int64], pool: Members, yields: Array,
            bounds: Array, rides: IndexArray, actions: Array, ride: int, rng: np.random.Generator) -> None:
     """Choose scale, kind, patience, a region of few rides down to a bin, one of its nodes, and a control."""
-    scale = _draw(yields, SCALE, len(order), rng.random())
-    rides[ride, SCALE] = scale
-    rides[ride, KIND] = _draw(yields, KIND, KINDS, rng.random())
-    rides[ride, PATIENCE] = _draw(yields, PATIENCE, PATIENCES, rng.random())
+    answers = (len(order), KINDS, PATIENCES)
+    for question in range(len(answers)):  # by numbers that vary: functions are compiled for each constant
+        rides[ride, question] = _draw(yields, question, answers[question], rng.random())
+    scale = rides[ride, SCALE]
     region: Number = np.int64(lowest(order, runs, tails, scale, rng.random()))
     for _ in range(scale):
         region = _least_child(rows, region, rng.random())
     rides[ride, BIN] = region
     rides[ride, NODE] = pool[rows[region].start + int(rng.random() * rows[region].length)]
-    level = 0
+    level: Number = np.int64(0)
     while region >= 0:
         rows[region].count += 1  # at once, so that rides side by side begin elsewhere
         lift(order, runs, tails, totals, rows, level, region, key_of(rows, region))

@@ -60,3 +60,14 @@ def test_all_kernels_are_looked_at():
     called_from = [path for path in seen for line in path.read_text("utf-8").splitlines()
                    if "import" in line and any(f".{Path(leaf).stem} " in line for leaf in LEAVES)]
     assert not called_from
+
+
+def test_compiled_code_is_loaded_without_scipy_which_others_can_still_call():
+    code = """
+import sys, pbcs_ompl.core.step_kernels
+from numba.np import arraymath, linalg
+assert "scipy.linalg" not in sys.modules
+linalg.ensure_blas()
+assert "scipy.linalg" in sys.modules and arraymath._HAVE_BLAS
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
