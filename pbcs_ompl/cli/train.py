@@ -17,12 +17,13 @@ from pbcs_ompl.core.formatting import format_duration, format_number, format_rat
 from pbcs_ompl.core.signals import with_remedy
 from pbcs_ompl.core.trust import module_names
 from pbcs_ompl.resettable import make
-from pbcs_ompl.results.command_line import command, eval_words, resume_words
+from pbcs_ompl.results.command_line import command, environment_words, eval_words, resume_words
 from pbcs_ompl.results.files import CHAIN, CONFIG, TRAJECTORY
 from pbcs_ompl.results.folder import RunFolder, read_config, read_folder
 from pbcs_ompl.results.trackers import tracker
 from pbcs_ompl.skills import TrainResult, resume, train
 from pbcs_ompl.skills.load_chain import load_chain
+from pbcs_ompl.skills.robots.evaluation import followers_of
 from pbcs_ompl.skills.trained_controller import TrainedController
 
 SHOWN = ("phase", "transitions", "updates", "covered", "skills", "seconds", "table")
@@ -137,6 +138,8 @@ def _closing_lines(arguments: Namespace, result: TrainResult, out: Path) -> list
     if result.robust is not None:
         rate = format_rate(result.robust.success_rate, result.robust.wilson)
         lines.append(("success", f"{rate} with {result.robust.epsilon:.0%} random actions, in fresh environments"))
+    if not result.solved:
+        lines += _without_training(arguments)
     lines.append(("files", list_files(out)))
     if result.complete and result.chain is None:
         return lines
@@ -144,3 +147,13 @@ def _closing_lines(arguments: Namespace, result: TrainResult, out: Path) -> list
     if result.complete:
         return [*lines, ("next", command(eval_words(out, epsilon=0.2, trust=trust)))]
     return [*lines, ("next", f"{command(resume_words(out, trust=trust))} --max-transitions N, with a larger N")]
+
+
+def _without_training(arguments: Namespace) -> list[tuple[str, str]]:
+    """Return how the follower that comes with pbcs drives the robot of the environment, where there is one."""
+    if arguments.env is None:
+        return []
+    spec = environment(arguments)
+    names = followers_of(make(spec))
+    return [("robot", f"{command(['plan', *environment_words(spec), '--follow', name])} drives along a plan without "
+                      "training") for name in names]

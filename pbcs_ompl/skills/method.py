@@ -40,8 +40,8 @@ class TrainingMethod(Protocol):
 
     @property
     def refusals(self) -> int:
-        """How often the judge has refused a chain that was finished."""
-        ...
+        """How often training has continued after the judge had refused a finished chain."""
+        return 0
 
     @property
     def done(self) -> bool:
@@ -73,8 +73,8 @@ class TrainingMethod(Protocol):
         ...
 
     def refused(self) -> bool:
-        """Continue training after the judge has refused a finished chain; return whether that is possible."""
-        ...
+        """Continue training after the judge has refused a finished chain; return whether the method does that."""
+        return False
 
     def chain(self, steps_per_skill: int) -> TrainedController | None:
         """Return the skills so far as a controller; None where there are none.

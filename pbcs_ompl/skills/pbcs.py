@@ -18,7 +18,7 @@ from pbcs_ompl.skills.activation_sets import (
 )
 from pbcs_ompl.skills.backplay import Backplay, SkillSettings
 from pbcs_ompl.skills.chain import Skill, SkillChain
-from pbcs_ompl.skills.method import Snapshot
+from pbcs_ompl.skills.method import Snapshot, TrainingMethod
 from pbcs_ompl.skills.observed_sets import Entry, entry_from_arrays, entry_kinds, entry_to_arrays
 from pbcs_ompl.skills.policy import SkillPolicy, policy_from_arrays, policy_to_arrays
 from pbcs_ompl.skills.sequential_test import SequentialTest
@@ -66,7 +66,7 @@ class ChainLink(NamedTuple):
     entry: Entry
 
 
-class PBCS:
+class PBCS(TrainingMethod):
     """Plan, Backplay, Chain Skills.
 
     Backplay trains a skill that ends at the goal and starts at some waypoint K; the next skill ends in the ball of K,
@@ -123,15 +123,6 @@ class PBCS:
         """The most transitions that the next step may take; nothing is known of a verification."""
         episodes = self.trainer.settings
         return sys.maxsize if self.complete else 2 * episodes.beta * episodes.max_steps
-
-    @property
-    def refusals(self) -> int:
-        """How often training has continued after the judge had refused the chain."""
-        return 0
-
-    def refused(self) -> bool:
-        """Return False: a training that has passed its own test is not continued."""
-        return False
 
     def chain(self, steps_per_skill: int) -> SkillChain | None:
         """Return the skills so far as a chain; None where there are none.

@@ -7,7 +7,7 @@ from typing import Any
 
 from pbcs_ompl.skills.chain import Skill, SkillChain
 from pbcs_ompl.skills.exploration import explore
-from pbcs_ompl.skills.method import Snapshot
+from pbcs_ompl.skills.method import Snapshot, TrainingMethod
 from pbcs_ompl.skills.settings import MethodSettings, PlannedSettings
 from pbcs_ompl.skills.trainer import SkillTrainer
 
@@ -33,7 +33,7 @@ class SinglePolicyState:
     filled: bool = False
 
 
-class SinglePolicy(ABC):
+class SinglePolicy(TrainingMethod, ABC):
     """A single policy that is trained to reach the environment's goal.
 
     Args:
@@ -81,15 +81,6 @@ class SinglePolicy(ABC):
     def longest_step(self) -> int:
         """The most transitions that the next step may take: those of a session, and of drawing its start states."""
         return sys.maxsize if self.done else 2 * self.trainer.settings.beta * self.trainer.limit(0)
-
-    @property
-    def refusals(self) -> int:
-        """How often training has continued after the judge had refused the chain."""
-        return 0
-
-    def refused(self) -> bool:
-        """Return False: a training that has passed its own test is not continued."""
-        return False
 
     def chain(self, steps_per_skill: int) -> SkillChain:
         """Return the policy as a chain of one skill.

@@ -1,6 +1,7 @@
 """How well a follower drives along a plan, or along the shortest way to the goal: executions by the judge."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import gymnasium
@@ -18,7 +19,7 @@ from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.judge import Judge
 from pbcs_ompl.skills.evaluation import MOST_EPISODES, Evaluation
 from pbcs_ompl.skills.path_following.line import Line
-from pbcs_ompl.skills.robots.follower import RobotFollower
+from pbcs_ompl.skills.robots.follower import RobotFollower, shipped_followers
 from pbcs_ompl.skills.robots.worlds import free_space, robot_of
 
 EXTRA = 4
@@ -88,6 +89,16 @@ def check_robot(follower: RobotFollower, model: ResettableModel) -> None:
             or not np.array_equal(mine.action_high, theirs.action_high)):
         raise Mismatch(f"the follower was trained for the robot of {follower.environment.label}, not for that of "
                        f"{model.spec.label}: observations or actions differ")
+
+
+def followers_of(model: ResettableModel) -> list[str]:
+    """Return the names of the followers that come with the package and were trained for the robot of a model."""
+    found = []
+    for name, folder in shipped_followers().items():
+        with suppress(Mismatch):
+            check_robot(RobotFollower.load(folder), model)
+            found.append(name)
+    return found
 
 
 def planned_line(follower: RobotFollower, model: ResettableModel, states: Array) -> Line:

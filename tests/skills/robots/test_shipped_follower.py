@@ -9,6 +9,7 @@ import pbcs_ompl
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import UnknownName
 from pbcs_ompl.skills import RobotFollower, evaluate_follower
+from pbcs_ompl.skills.robots.evaluation import followers_of
 from pbcs_ompl.skills.robots.shaking import CYCLE, waves
 
 pytest.importorskip("mujoco")
@@ -70,3 +71,8 @@ def test_unknown_names_and_other_robots_are_refused(ant: RobotFollower) -> None:
         RobotFollower.shipped("aunt")
     with pytest.raises(pbcs_ompl.core.errors.Mismatch, match="observations or actions differ"):
         evaluate_follower(ant, "pbcs/AntMaze-v0", env_kwargs={"ant": "d4rl"})
+
+
+def test_an_environment_is_offered_the_follower_of_its_robot() -> None:
+    assert followers_of(pbcs_ompl.make("pbcs/AntMaze-v0", {"size": 3, "integrator": "Euler"})) == ["ant"]
+    assert followers_of(pbcs_ompl.make("pbcs/Maze-v0")) == []
