@@ -130,8 +130,9 @@ class Follow:
 
     @property
     def _max_steps(self) -> int:
-        """Time limit of an execution along the whole line, in steps."""
-        return self.settings.criterion.time_limit_factor * max(self.task.hops, self.settings.episodes.max_steps)
+        """Time limit of an execution along the whole line, in steps; the environment ends it at its own."""
+        longest = self.settings.criterion.time_limit_factor * max(self.task.hops, self.settings.episodes.max_steps)
+        return min(longest, self.trainer.model.max_episode_steps)
 
     def chain(self, steps_per_skill: int) -> FollowChain:
         """Return the finished policies as a controller; before they lead from the start, with the best of the present.

@@ -449,6 +449,17 @@ def test_a_policy_is_refused_where_the_last_one_failed_without_an_execution_of_t
     assert {0, task.pointers[task.place(middle - 5)]} == set(begun)
 
 
+def test_a_test_ends_where_the_environment_ends_an_episode(plan: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    follow = method(plan.states)
+    longest = follow.longest_step
+    monkeypatch.setattr(follow.trainer.model, "max_episode_steps", 7)
+    assert follow.longest_step == (follow.settings.gate.most_trials + 1) * 7 < longest
+    start = follow.task.at(np.array([0]))
+    before = follow.trainer.counter.count
+    follow._failures(Relay([follow._average], [0]), start, np.array([follow.task.line.last + 1]), 0.0)
+    assert follow.trainer.counter.count - before <= 7
+
+
 def test_a_session_takes_its_share_of_the_test_before(plan: Trajectory) -> None:
     following = method(plan.states, FollowSettings().updated({"test_share": 0.5, "session_lengths": 1}))
     shortest = following._session_transitions
