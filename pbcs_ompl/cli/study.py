@@ -51,9 +51,9 @@ def run(arguments: Namespace) -> int:
 
 def _make(study: Study, arguments: Namespace, out: Path) -> int:
     """Make the runs, all of them or those of a shard, and print the result."""
-    runs = study.all_runs(arguments.seeds)
+    runs = [] if arguments.from_records else study.all_runs(arguments.seeds)
     shard = None if arguments.shard is None else Shard(*arguments.shard)
-    budget = len(runs if shard is None else shard.of(runs))
+    budget = len(runs if shard is None else shard.of(runs)) or None
     with executor(arguments) as jobs, ProgressDisplay(study.id, count="runs", budget=budget) as display:
         options = {"out": out, "seeds": arguments.seeds, "jobs": jobs, "max_seconds": arguments.max_seconds,
                    "max_memory": arguments.max_memory, "on_progress": display}

@@ -1,7 +1,6 @@
 """Run a study: the runs that were not made yet, then the analysis; or one shard of the runs."""
 
 import os
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,15 +104,15 @@ def run_study(study: Study | str | Path, *, out: str | Path, seeds: int | None =
         2
     """
     chosen, executor, limits = _study(study), make_executor(jobs), Limits(max_seconds, max_memory)
-    shipped: dict[str, Record] = {}
-    if from_records:
-        seeds, shipped = shipped_records(chosen)
-    runs = chosen.all_runs(seeds)
+    shipped = shipped_records(chosen) if from_records else None
+    seeds, runs = (seeds, chosen.all_runs(seeds)) if shipped is None else (shipped.seeds, [])
     with open_study(chosen, out, seeds) as folder:
-        for name, record in shipped.items():
-            write_summed_json(record_file(folder.path, name), record)
-        made = [run for run in runs if run.name in shipped] if from_records else runs
-        records, failures = _make(chosen, made, folder.path, executor, limits, on_progress)
+        if shipped is None:
+            records, failures = _make(chosen, runs, folder.path, executor, limits, on_progress)
+        else:
+            records, failures = shipped.records, {}
+            for name, record in records.items():
+                write_summed_json(record_file(folder.path, name), record)
         failed = {name: failure.reason for name, failure in failures.items()}
         if not records:
             name, reason = next(iter(failed.items()))
@@ -124,7 +123,7 @@ def run_study(study: Study | str | Path, *, out: str | Path, seeds: int | None =
             claims = chosen.analyse(list(records.values()), figures)
         result = StudyResult(chosen.id, list(records.values()), failed, str(folder.path),
                              [str(path) for path in sorted(figures.glob("*.png"))], claims,
-                             dict(Counter(map(_series, runs)) - Counter(map(_series, made))))
+                             {} if shipped is None else shipped.left_out)
         folder.write_result(result.summary())
     return result
 
@@ -157,11 +156,6 @@ def open_study(study: Study, out: str | Path, seeds: int | None = None, *, shard
     config = {"kind": "study", "study": study.id, "folder": _published(study.folder),
               "seeds": study.number_of_seeds(seeds), **study.sweep}
     return open_run(Path(out), config, may_change=("folder", "seeds"), shard=shard)
-
-
-def _series(run: Run) -> str:
-    """Return the name of a run without its number."""
-    return run.name.rpartition("-")[0]
 
 
 def _published(folder: Path) -> str | None:

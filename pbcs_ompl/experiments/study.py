@@ -5,6 +5,7 @@ import json
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -54,7 +55,9 @@ class Study:
 
         Raises:
             InvalidOption: fewer than one seed.
-            PbcsError: there are no runs, their names cannot name files, or their settings are not plain values.
+            PbcsError: there are no runs, their names cannot name files, their settings are not plain values, or
+                `study.py` does not run or lacks a function.
+            MissingDependency: the runs need a library that is not installed.
         """
         settings = self.runs(self.sweep, self.number_of_seeds(seeds))
         names = [str(one.get("name", "")) for one in settings]
@@ -94,24 +97,26 @@ def study_ids() -> dict[str, str]:
 
 
 def find_study(name: str | Path) -> Study:
-    """Return the study of this id, or in the folder of this name.
+    """Return the study of this id, or in the folder of this name. Its `study.py` is imported when runs are asked for.
 
     Raises:
         UnknownName: there is none; the closest is suggested.
         DamagedFile: the sweep does not parse, or lacks `title` or `seeds`.
-        PbcsError: a script does not run, or lacks a function.
+        PbcsError: `analysis.py` does not run, or lacks a function.
     """
     folder = Path(name) if (Path(name) / SCRIPT).is_file() else study_folders().get(str(name))
     if folder is None:
         raise UnknownName("study", str(name), study_folders())
     sweep = _sweep(folder)
-    script, analysis = _load(folder / SCRIPT, "runs", "run"), _load(folder / ANALYSIS, "analyse")
+    script = cache(lambda: _load(folder / SCRIPT, "runs", "run"))  # runs may need torch, figures do not
+    analysis = _load(folder / ANALYSIS, "analyse")
     for key in ("title", "seeds"):
         if key not in sweep:
             raise DamagedFile(f"{folder / SWEEP} lacks {key!r}")
     title, seeds = sweep.pop("title"), sweep.pop("seeds")
     study_id = folder.resolve().name.replace("_", "-")
-    return Study(study_id, folder, title, seeds, sweep, script.runs, script.run, analysis.analyse)
+    return Study(study_id, folder, title, seeds, sweep, lambda values, count: script().runs(values, count),
+                 lambda settings: script().run(settings), analysis.analyse)
 
 
 def study_folders() -> dict[str, Path]:

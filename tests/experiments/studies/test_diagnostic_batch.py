@@ -6,7 +6,8 @@ import pytest
 from pbcs_ompl.agents import DDPG, DDPGSettings
 from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.experiments.diagnostic_batch import DiagnosticBatch, sample_states
-from pbcs_ompl.experiments.stacked_training import chunks, joined_first_rewards, joined_observed, joined_success
+from pbcs_ompl.experiments.stacked_training import chunks
+from pbcs_ompl.experiments.training_curves import joined_first_rewards, joined_observed, joined_success
 from pbcs_ompl.resettable import make
 
 RECORDS = [{"success": [[0, 1], [0, 1], [1, 1]], "first_reward": [30, 2], "observed": {"x": [[0, 0], [1, 2]]}},

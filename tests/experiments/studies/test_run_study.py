@@ -13,7 +13,7 @@ from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, PbcsError, RunFolderError, UnknownName
 from pbcs_ompl.experiments.claims import rate
 from pbcs_ompl.experiments.run_study import run_study
-from pbcs_ompl.experiments.shipped_records import PACKED, pack, shipped_records
+from pbcs_ompl.experiments.shipped_records import PACKED, pack, runs_without_record, shipped_records
 from pbcs_ompl.experiments.study import find_study, study_folders, study_ids
 
 SWEEP = 'title = "Heads or tails"\nseeds = 3\nsides = 2\n'
@@ -138,7 +138,7 @@ def test_mistakes_are_named(folder, tmp_path):
 def test_a_broken_study_is_one_clear_line(folder, name, text, expected):
     (folder / name).write_text(text)
     with pytest.raises(PbcsError, match=expected):
-        find_study(str(folder))
+        find_study(str(folder)).all_runs()
 
 
 @pytest.mark.parametrize(("settings", "expected"), [
@@ -207,7 +207,21 @@ def test_missing_and_damaged_shipped_records_are_named(folder, tmp_path, capsys)
 @pytest.mark.parametrize("name", [name for name, folder in study_folders().items() if (folder / PACKED).is_file()])
 def test_the_shipped_records_are_those_of_the_present_runs(name):
     study = find_study(name)
-    seeds, records = shipped_records(study)
-    known = {run.name for run in study.all_runs(seeds)}
+    seeds, left_out, records = shipped_records(study)
+    runs = study.all_runs(seeds)
     assert records
-    assert set(records) <= known
+    assert set(records) <= {run.name for run in runs}
+    assert left_out == runs_without_record(runs, records)
+
+
+def test_figures_are_drawn_from_records_without_torch():
+    code = ("import sys\n"
+            "class Without:\n"
+            "    def find_spec(self, name, *_):\n"
+            "        if name in ('torch', 'safetensors'):\n"
+            "            raise ModuleNotFoundError(name)\n"
+            "sys.meta_path.insert(0, Without())\n"
+            "from pbcs_ompl.experiments.study import find_study, study_ids\n"
+            "print(*(study.id for study in map(find_study, study_ids()) if callable(study.analyse)))\n")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.split() == list(study_ids()), done.stderr

@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.colors import LogNorm
 
 from pbcs_ompl.experiments.claims import Claim, Rate, at_least, at_most, greater, higher, no_higher, rate
-from pbcs_ompl.experiments.studies.backplay_2x2.study import OF_ALL_SEEDS
 from pbcs_ompl.figures.by_group import rates_figure
 from pbcs_ompl.figures.canvas import QUANTITIES, publish
 from pbcs_ompl.figures.maze import legend_below, map_axes
@@ -19,7 +18,7 @@ LOW, HIGH = 0.9, 0.99
 
 def analyse(records: Records, figures: Path) -> list[Claim]:
     """Draw the rates and the visits of DDPG alone; compare."""
-    trainings = [record for record in records if record["label"] not in OF_ALL_SEEDS]
+    trainings = [record for record in records if "method" in record]
     corrections = {record["discount"]: record for record in records if record["label"] == "correction"}
     alone = [record for record in records if record["label"] == "alone"]
     claims = []

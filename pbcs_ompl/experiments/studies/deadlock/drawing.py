@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.core.statistics import wilson
-from pbcs_ompl.experiments.stacked_training import joined_rows
 from pbcs_ompl.experiments.studies.deadlock.variants import ARGMAX, GREEDY, OU, REGRESSION, SAC, TD3, Variant
+from pbcs_ompl.experiments.training_curves import joined_rows
 from pbcs_ompl.figures.canvas import colour, new_panels, publish
 from pbcs_ompl.figures.diagnostics import curves_figure, stuck_critic_figure, success_figure
 

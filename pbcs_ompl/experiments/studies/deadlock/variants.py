@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.experiments.claims import Rate, rate
-from pbcs_ompl.experiments.stacked_training import joined_first_rewards, joined_observed, joined_success
+from pbcs_ompl.experiments.training_curves import joined_first_rewards, joined_observed, joined_success
 
 EARLY = 50
 GREEDY, OU, TD3 = "ddpg-epsilon-greedy", "ddpg-ornstein-uhlenbeck", "td3-epsilon-greedy"

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 
 from pbcs_ompl.experiments.claims import Claim, greater, higher, never, rate, sometimes
-from pbcs_ompl.experiments.studies.presets.study import ALL_BUT, FIRST
 from pbcs_ompl.figures.by_row import rows_figure
 from pbcs_ompl.figures.canvas import publish
 
 Records = list[dict[str, Any]]
+FIRST, ALL_BUT = "first", "all-but"
+"""Kinds of rows: with the first k changes, and with all changes but the k-th."""
 OURS = 'ours: what the preset "fast" is for'
 LITERAL, SMALL = "as [Matheron2020]: Alg. 6 to 8", "Alg. 6 to 8 with networks of 64 units"
 

@@ -3,13 +3,12 @@
 from typing import Any
 
 from pbcs_ompl.agents import DDPGSettings
+from pbcs_ompl.experiments.studies.presets.analysis import ALL_BUT, FIRST
 from pbcs_ompl.experiments.training_run import trained
 from pbcs_ompl.skills import method_settings
 from pbcs_ompl.skills.settings import flat_names
 
 THESIS, FAST = "thesis", "fast"
-FIRST, ALL_BUT = "first", "all-but"
-"""Rows: with the first k changes, and with all changes but the k-th."""
 
 
 def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
