@@ -73,7 +73,7 @@ class GetSetStateModel(Model):
         return following
 
     def observe(self, states: Array) -> Array:
-        """Return the observations [B, O] of states [B, D]; the last steps have shown those of the states they led to."""
+        """Return the observations [B, O] of states [B, D]; the last steps have shown those of where they led."""
         states = np.array(states, dtype=np.float64)
         rows = [self._seen.get(state.tobytes()) for state in states]
         if not rows or all(row is None for row in rows):
