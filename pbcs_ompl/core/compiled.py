@@ -67,7 +67,7 @@ def _without_scipy() -> Iterator[None]:
     they are compiled.
     """
     linear_algebra: Any = import_module("numba.np.linalg")
-    usual = linear_algebra.ensure_blas
+    usual = getattr(linear_algebra, "ensure_blas", _usual)  # it is no public name of Numba's
     linear_algebra.ensure_blas = _usual
     try:
         yield

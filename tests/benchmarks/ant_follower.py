@@ -1,10 +1,10 @@
-"""How well the ant's follower drives in mazes that it never saw, without any training there: executions by the judge.
+"""How well an ant's follower drives in mazes that it never saw, without any training there: executions by the judge.
 
     python tests/benchmarks/ant_follower.py runs/ant-follower/follower --noise 0 0.1 --episodes 10
 
 Mazes of `pbcs/AntMaze-v0` (RK4, no end when unhealthy, goal radius 0.8 m) with seeds from 500 on, shortest ways; its
 official maps (0.45 m); with --robotics those of gymnasium-robotics under their own ids, with the starts and goals that
-their resets draw; with --plans plans of Ex instead of shortest ways.
+their resets draw (Gymnasium's ant only); with --plans plans of Ex instead of shortest ways.
 """
 
 import argparse
@@ -55,10 +55,13 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="*", default=[2, 3, 4, 5, 6])
     parser.add_argument("--mazes", type=int, default=5)
     parser.add_argument("--episodes", type=int, default=10)
+    parser.add_argument("--seed", type=int, default=0, help="of the executions; resets of gymnasium-robotics count on "
+                                                            "from 700 more")
     parser.add_argument("--plans", type=int, default=0, help="plans of Ex in the 2x2 maze")
     parser.add_argument("--robotics", type=int, default=0, help="resets of each map of gymnasium-robotics")
     given = parser.parse_args()
     follower, total = RobotFollower.load(given.follower), {}
+    own = {"threads": 1, "ant": follower.environment.kwargs.get("ant", "gymnasium")}
 
     def count(group: str, noise: float, name: str, line: Line, found: pbcs_ompl.Evaluation) -> None:
         successes, episodes = total.get((group, noise), (0, 0))
@@ -69,18 +72,19 @@ def main() -> None:
 
     tasks = [(group, str(options), model, shortest_line(follower, model))
              for group, options in mazes(given.sizes, given.mazes)
-             for model in [pbcs_ompl.make("pbcs/AntMaze-v0", {**options, "threads": 1})]]
+             for model in [pbcs_ompl.make("pbcs/AntMaze-v0", {**options, **own})]]
     for seed in range(600, 600 + given.plans):
         options = {"control_duration": 10}
-        result = plan("pbcs/AntMaze-v0", "Ex", env_kwargs={"threads": 1}, planner_kwargs=options, seed=seed)
+        result = plan("pbcs/AntMaze-v0", "Ex", env_kwargs=own, planner_kwargs=options, seed=seed)
         if result.trajectory is not None:
-            model = pbcs_ompl.make("pbcs/AntMaze-v0", {"threads": 1})
+            model = pbcs_ompl.make("pbcs/AntMaze-v0", own)
             tasks.append(("2x2 along Ex", f"Ex {seed}", model, planned_line(follower, model, result.trajectory.states)))
     for noise in given.noise:
         for group, name, model, line in tasks:
-            count(group, noise, name, line, drive(follower, model, line, episodes=given.episodes, epsilon=noise))
+            count(group, noise, name, line, drive(
+                follower, model, line, episodes=given.episodes, epsilon=noise, seed=given.seed))
         for name, env_id in OFFICIAL.items():
-            for seed in range(given.robotics):
+            for seed in range(given.seed, given.seed + given.robotics):
                 model = pbcs_ompl.make(env_id, start_seed=700 + seed)
                 line = robotics_line(follower, name, model.observe(model.initial_state()[None])[0])
                 count(env_id, noise, f"{env_id} {seed}", line, drive(

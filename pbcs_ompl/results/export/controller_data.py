@@ -18,7 +18,7 @@ from pbcs_ompl.skills.observed_sets import ObservedBall, ObservedClassifier
 from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.path_following.shown_feature import NO_SINE
-from pbcs_ompl.skills.robots.follower import RobotFollower
+from pbcs_ompl.skills.robots.follower import LOST_AFTER, RobotFollower
 from pbcs_ompl.skills.robots.shaking import waves
 
 PROBES = 16
@@ -99,7 +99,7 @@ def _robot(follower: RobotFollower, line: Line | None) -> ControllerData:
     if line is not None:
         arrays["line"] = line.points
     words = {"kind": "robot follower", "memory": {"pointer": 0, "stalled": -1, "side": -1}, "patience": view.patience,
-             "reach": _reach(view.window, follower.spacing), "spacing": follower.spacing,
+             "lost_after": LOST_AFTER, "reach": _reach(view.window, follower.spacing), "spacing": follower.spacing,
              "speeds": _first_speed(robot, size)}
     return _with_networks(words, arrays, [follower.policy], follower.environment, follower.actions, size)
 

@@ -261,7 +261,8 @@ def _share(graph: Graph, data: ControllerData, stalled: str) -> str:
 def _robot(graph: Graph, data: ControllerData, seen: str, memory: dict[str, str], line: str) -> Step:
     words, arrays = data
     places = graph.columns(seen, arrays["entries"])
-    pointer, stalled = _advanced(graph, data, places, memory, line)
+    found = _found_again(graph, data, places, memory, line)
+    pointer, stalled = _advanced(graph, data, places, found, line)
     side = _leading(graph, data, seen, graph("Squeeze", _ahead(graph, line, places, pointer, arrays["half"]), [1]),
                     memory["side"])
     matrix = graph("Gather", arrays["side_observations"], side, axis=0)

@@ -88,7 +88,8 @@ def check_robot(follower: RobotFollower, model: ResettableModel) -> None:
             or not np.array_equal(mine.action_low, theirs.action_low)
             or not np.array_equal(mine.action_high, theirs.action_high)):
         raise Mismatch(f"the follower was trained for the robot of {follower.environment.label}, not for that of "
-                       f"{model.spec.label}: observations or actions differ")
+                       f"{model.spec.label}: observations or actions differ; train one for it, or take one of those "
+                       f"that come with the package ({', '.join(shipped_followers())})")
 
 
 def followers_of(model: ResettableModel) -> list[str]:

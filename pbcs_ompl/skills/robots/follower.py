@@ -29,6 +29,9 @@ from pbcs_ompl.skills.side_by_side import SideBySide
 STRUCTURE, POLICY = "follower.json", "follower.safetensors"
 FORMAT, VERSION = "pbcs_ompl robot follower", 1
 SHIPPED = Path(__file__).parent / "followers"
+LOST_AFTER = CYCLE
+"""Steps without progress after which a pointer goes back to the nearest point that it has passed (ours). A robot that
+shakes behind a wall takes its pointer along the other side of it. After a cycle shaking continues without a jump."""
 GAP = 8.0
 """Longest hop along each axis by which loops of a plan are erased, in spacings of lines (ours)."""
 
@@ -48,7 +51,7 @@ class FollowerWords(TypedDict):
 
 
 class RobotController(SideBySide):
-    """Drives episodes along one line: a pointer for each of them moves forward on it.
+    """Drives episodes along one line: a pointer for each of them moves forward on it, and back where one is lost.
 
     The policy acts as long as the robot stands; one that has fallen shakes, see `pbcs_ompl.skills.robots.shaking`.
 
@@ -76,7 +79,7 @@ class RobotController(SideBySide):
 
     def _act(self, observations: Array, members: IndexArray) -> Actions:
         shown = observations if self._entries is None else observations[:, self._entries]
-        moved = self.progress[members].advanced(self.line, self._view.places(shown), self._view.window)
+        moved = self.progress[members].advanced(self.line, self._view.places(shown), self._view.window, LOST_AFTER)
         sides = self._view.leading(shown, self.line, moved, self._sides[members])
         self.progress.pointers[members], self.progress.stalled[members] = moved.pointers, moved.stalled
         self._sides[members] = sides
@@ -146,7 +149,7 @@ class RobotFollower:
     @classmethod
     @checked
     def shipped(cls, name: str) -> "RobotFollower":
-        """Return a follower that comes with the package, such as "ant" (Gymnasium's, trained by `examples`).
+        """Return a follower that comes with the package, "ant" (Gymnasium's) or "ant-d4rl"; see `examples`.
 
         Raises:
             UnknownName: no such follower; the message suggests the closest one.

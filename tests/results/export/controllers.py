@@ -16,7 +16,7 @@ from pbcs_ompl.skills.path_following.follower import LineView
 from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.path_following.shown_feature import NO_SINE, ShownFeature
 from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
-from pbcs_ompl.skills.robots.follower import RobotFollower
+from pbcs_ompl.skills.robots.follower import LOST_AFTER, RobotFollower
 from pbcs_ompl.skills.robots.view import RobotView
 
 MAZE = EnvSpec("pbcs/Maze-v0", {"size": 2})
@@ -88,7 +88,8 @@ def point_follower() -> Case:
     rng = np.random.default_rng(2)
     view = RobotView(PointRobot(), ObservationTransform.identity(0), np.array([0.1, 0.2, 0.4]), 0.3, 15)
     line = Line.through(np.array([[0.0, 0.0], [1.0, 0.2], [1.0, 1.5]]), 0.05)
-    walks = np.cumsum(rng.uniform(-0.02, 0.1, (20, 50, 2)), axis=0)
+    walks = np.cumsum(rng.uniform(-0.02, 0.1, (200, 5, 2)), axis=0)
+    walks[15:15 + LOST_AFTER + 10] = walks[3]  # so long that pointers go back
     follower = RobotFollower(network(rng, view.size), view, MAZE, ActionMap(np.full(2, -0.1), np.full(2, 0.1), (2,)),
                              0.05, 0.1, {})
     return Case(follower, walks, line)

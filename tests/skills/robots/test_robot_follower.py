@@ -17,7 +17,7 @@ from pbcs_ompl.skills.path_following.follower import Progress
 from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.policy import ObservationTransform
 from pbcs_ompl.skills.robots.evaluation import evaluate_follower
-from pbcs_ompl.skills.robots.follower import RobotFollower
+from pbcs_ompl.skills.robots.follower import LOST_AFTER, RobotFollower
 from pbcs_ompl.skills.robots.free_space import FreeSpace
 from pbcs_ompl.skills.robots.lines import Lines
 from pbcs_ompl.skills.robots.settings import RobotSettings
@@ -131,6 +131,18 @@ def test_it_drives_along_a_plan(trained: FollowerResult) -> None:
     found = plan("pbcs/Maze-v0", "Ex", env_kwargs={"size": 4, "maze_seed": 9}, seed=1)
     assert found.trajectory is not None
     assert evaluate_follower(trained.follower, trajectory=found.trajectory, episodes=10).success_rate == 1.0
+
+
+def test_a_pointer_that_waits_in_vain_goes_back(trained: FollowerResult) -> None:
+    line = Line.through(np.array([[0.5, 0.5], [1.5, 0.5], [1.5, 1.5], [0.5, 1.5]]), 0.05)
+    controller = trained.follower.controller(line)
+    controller.progress.pointers[:] = line.last
+    pointers = []
+    for _ in range(LOST_AFTER + 2):
+        controller.act(np.array([0.6, 0.5]))
+        pointers.append(int(controller.progress.pointers[0]))
+    assert set(pointers[:-1]) == {line.last}
+    assert pointers[-1] == 2
 
 
 def test_a_saved_follower_is_the_same_and_a_changed_one_is_refused(trained: FollowerResult, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The follower that comes with the package drives in mazes that it never saw, without training there."""
+"""The followers that come with the package drive in mazes that they never saw, without training there."""
 
 import json
 
@@ -10,6 +10,7 @@ from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import UnknownName
 from pbcs_ompl.skills import RobotFollower, evaluate_follower
 from pbcs_ompl.skills.robots.evaluation import followers_of
+from pbcs_ompl.skills.robots.follower import shipped_followers
 from pbcs_ompl.skills.robots.shaking import CYCLE, waves
 
 pytest.importorskip("mujoco")
@@ -20,9 +21,12 @@ def ant() -> RobotFollower:
     return RobotFollower.shipped("ant")
 
 
-@pytest.mark.parametrize("options", [{}, {"size": 4, "maze_seed": 503}, {"map": "umaze", "goal_radius": 0.45}])
-def test_the_ant_walks_to_the_goal(ant: RobotFollower, options: dict) -> None:
-    found = evaluate_follower(ant, "pbcs/AntMaze-v0", env_kwargs={**options, "threads": 1}, episodes=4)
+@pytest.mark.parametrize(("name", "options"), [
+    ("ant", {}), ("ant", {"size": 4, "maze_seed": 503}), ("ant", {"map": "umaze", "goal_radius": 0.45}),
+    ("ant-d4rl", {"ant": "d4rl"})])
+def test_the_ant_walks_to_the_goal(name: str, options: dict) -> None:
+    found = evaluate_follower(RobotFollower.shipped(name), "pbcs/AntMaze-v0", env_kwargs={**options, "threads": 1},
+                              episodes=4)
     assert found.successes >= 3, found
 
 
@@ -52,8 +56,9 @@ def test_no_two_joints_swing_together_for_long() -> None:
     np.testing.assert_array_equal(np.abs(controls), 1.0)
 
 
-def test_its_training_is_recorded_and_none_of_its_worlds_is_in_the_tables(ant: RobotFollower) -> None:
-    training = ant.training
+@pytest.mark.parametrize("name", shipped_followers())
+def test_its_training_is_recorded_and_none_of_its_worlds_is_in_the_tables(name: str) -> None:
+    training = RobotFollower.shipped(name).training
     assert training["transitions"] > 500_000
     assert training["settings"]["patience"] == 30
     assert {world.get("maze_seed", 0) for world in training["worlds"]} <= {0, *range(100, 112)}
@@ -69,10 +74,11 @@ def test_the_command_line_knows_it_by_name(capsys: pytest.CaptureFixture[str]) -
 def test_unknown_names_and_other_robots_are_refused(ant: RobotFollower) -> None:
     with pytest.raises(UnknownName, match="'ant'"):
         RobotFollower.shipped("aunt")
-    with pytest.raises(pbcs_ompl.core.errors.Mismatch, match="observations or actions differ"):
+    with pytest.raises(pbcs_ompl.core.errors.Mismatch, match=r"observations or actions differ.*ant-d4rl"):
         evaluate_follower(ant, "pbcs/AntMaze-v0", env_kwargs={"ant": "d4rl"})
 
 
 def test_an_environment_is_offered_the_follower_of_its_robot() -> None:
     assert followers_of(pbcs_ompl.make("pbcs/AntMaze-v0", {"size": 3, "integrator": "Euler"})) == ["ant"]
+    assert followers_of(pbcs_ompl.make("pbcs/AntMaze-v0", {"ant": "d4rl"})) == ["ant-d4rl"]
     assert followers_of(pbcs_ompl.make("pbcs/Maze-v0")) == []
