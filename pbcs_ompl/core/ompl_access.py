@@ -16,7 +16,7 @@ from ompl import util as ou
 
 from pbcs_ompl.core.errors import UnsupportedSpace
 from pbcs_ompl.core.seeding import SeedTree
-from pbcs_ompl.core.types import Array
+from pbcs_ompl.core.types import Array, IndexArray
 
 Reader = Callable[[Any], list[float]]
 Writer = Callable[[Any, Sequence[float]], None]
@@ -132,20 +132,21 @@ def _write_each(vector: Any, floats: Sequence[float]) -> None:
         vector[dim] = number
 
 
-def path_control(si: Any, states: Array, controls: Array) -> Any:
-    """Return the `ompl.control.PathControl` of arrays; each control lasts one propagation step.
+def path_control(si: Any, states: Array, controls: Array, durations: IndexArray | None = None) -> Any:
+    """Return the `ompl.control.PathControl` of arrays.
 
     Args:
         si: The `ompl.control.SpaceInformation`, whose spaces are made of real vectors.
         states: The states [T+1, D].
         controls: The controls [T, A].
+        durations: How many propagation steps each control lasts [T]; None for one.
     """
     write_state, write_control = value_writer(si.getStateSpace()), value_writer(si.getControlSpace())
     path, state, control = oc.PathControl(si), si.allocState(), si.allocControl()
-    duration = si.getPropagationStepSize()
+    seconds = si.getPropagationStepSize() * (np.ones(len(controls)) if durations is None else durations)
     # Tuples out of zip are freed one by one; a list for each state would wake the garbage collector.
-    for values, action in zip(zip(*states[:-1].T.tolist(), strict=True), zip(*controls.T.tolist(), strict=True),
-                              strict=True):
+    for values, action, duration in zip(zip(*states[:-1].T.tolist(), strict=True),
+                                        zip(*controls.T.tolist(), strict=True), seconds.tolist(), strict=True):
         write_state(state, values)
         write_control(control, action)
         path.append(state, control, duration)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.optimize import nnls
 
 from pbcs_ompl.core.errors import DamagedFile
 from pbcs_ompl.core.interfaces import ResettableModel
@@ -132,6 +131,8 @@ def observed_metric(model: ResettableModel, states: Array, radius: float) -> Arr
     observations = model.observe(states)
     first, second = np.triu_indices(len(states), 1)
     squares = (observations[first] - observations[second]) ** 2
+    from scipy.optimize import nnls  # takes longer to load than a short training
+
     distances = model.distance(states[first], states[second])
     fitted = np.arange(len(first)) % 2 == 0
     unit = np.maximum(squares.max(axis=0), 1e-12)  # of each entry, for the fit

@@ -6,6 +6,7 @@ from ompl import base as ob
 from ompl import control as oc
 
 from pbcs_ompl.bridge.problem import make_problem
+from pbcs_ompl.bridge.trajectory import to_trajectory
 from pbcs_ompl.core import registry
 from pbcs_ompl.core.errors import InvalidOption, PlannerUnavailable
 from pbcs_ompl.core.interfaces import BatchPlanner, PlannerFactory
@@ -56,8 +57,8 @@ def search(entry, seed, budget, **options):
         count, states, controls, checked = counter.count, np.empty((0, 2)), np.empty((0, 2)), True
         if setup.haveExactSolutionPath():
             path = setup.getSolutionPath()
-            states = np.array([[s[0], s[1]] for s in path.getStates()])
-            controls = np.array([[c[0], c[1]] for c in path.getControls()]).reshape(-1, 2)
+            trajectory = to_trajectory(path, problem.space_information, model)
+            states, controls = trajectory.states, trajectory.controls
             counter.count = 0  # as the check makes all steps again
             checked = path.check()
         return status.getStatus(), count, states, controls, checked

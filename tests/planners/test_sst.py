@@ -68,7 +68,7 @@ def test_it_continues_to_the_end_of_the_budget_with_shorter_paths_only(solve, sq
         assert len(found) > (kind is SSTCompiled)  # the first of Rides may be the best there is
         assert all(late.steps < early.steps for early, late in pairwise(found))
         assert all(late.transitions > early.transitions for early, late in pairwise(found))
-        assert found[-1].steps == len(planner.solution) - 1 == setup.getSolutionPath().getControlCount()
+        assert found[-1].steps == len(planner.solution) - 1 == round(setup.getSolutionPath().length())
         assert model.goal_distance(tree.states[planner.solution[-1:]])[0] < model.goal_threshold
         if not options:  # what can only be longer is not tried; side by side some are under way
             depths = depths_of(tree)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from ompl import base as ob
 
+from pbcs_ompl.bridge.trajectory import to_trajectory
 from pbcs_ompl.core.errors import CallbackFailed, InvalidOption, Mismatch
 from pbcs_ompl.core.types import Counter
 from pbcs_ompl.planners import RRTNH, ESTAdapted, Ex, RandomWalk, RRTSteered, Strategy, Tree
@@ -54,7 +55,9 @@ def test_tree_path_and_count_belong_together(solve, square, kind, terminal):
         path = setup.getSolutionPath()
         nodes = planner.tree.path_to(len(planner.tree) - 1)
         assert path.check()
-        assert [[s[0], s[1]] for s in path.getStates()] == planner.tree.states[nodes].tolist()
+        trajectory = to_trajectory(path, setup.getSpaceInformation(), model)
+        assert trajectory.states.tolist() == planner.tree.states[nodes].tolist()
+        assert trajectory.controls.tolist() == planner.tree.controls[nodes[1:]].tolist()
         assert model.goal_distance(planner.tree.states)[:-1].min() >= model.goal_threshold
         assert setup.haveExactSolutionPath()
 

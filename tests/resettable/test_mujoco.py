@@ -57,6 +57,16 @@ def test_physics_is_that_of_the_environment_itself(model: Any) -> None:
         np.testing.assert_array_equal(model.env.inner.data.qvel, raw.data.qvel)
 
 
+def test_a_step_shows_what_its_restored_state_shows(model: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    states, controls = chain_of(model, 12)
+    after = model.transition(states, controls).states
+    restored = model.env.observe(after)
+    mixed = np.concatenate([after[:3], states[:1]])
+    np.testing.assert_array_equal(model.observe(mixed), np.concatenate([restored[:3], model.env.observe(states[:1])]))
+    monkeypatch.setattr(model, "_observe", None)  # no state is restored for what was seen
+    np.testing.assert_array_equal(model.observe(after), restored)
+
+
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_batch_and_threads_change_nothing(threads: int) -> None:
     one = make("Ant-v5")

@@ -9,13 +9,14 @@ from pbcs_ompl.core.batches import check_batch
 from pbcs_ompl.core.errors import InvalidOption, InvalidState, NotResettable
 from pbcs_ompl.core.types import Array, BoolArray, Transition
 from pbcs_ompl.resettable.actions import Actions
+from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import as_vector, state_bounds
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.resettable.model import Model
 from pbcs_ompl.resettable.observing import missing_observe, state_observer
 
-Step = tuple[Array, float, bool, bool]
-"""Next state [D], reward, terminated, truncated."""
+Step = tuple[Array, float, bool, bool, Any]
+"""Next state [D], reward, terminated, truncated, observation."""
 
 
 class GetSetStateModel(Model):
@@ -37,6 +38,7 @@ class GetSetStateModel(Model):
         if observe is None:
             raise missing_observe(env)
         self._observe = observe
+        self._seen: dict[bytes, Any] = {}
         if offers.goal_distance is None or offers.goal_threshold is None:
             raise NotResettable(f"{self.spec.id}: `goal_distance` and `goal_threshold` go together; set both")
         self._goal_distance: Callable[[Array], Array] = offers.goal_distance
@@ -55,6 +57,8 @@ class GetSetStateModel(Model):
             raise InvalidOption(f"got {len(controls)} controls for {len(states)} states")
         steps = self._steps(states, controls)
         after = np.array([step[0] for step in steps]).reshape(states.shape)
+        if isinstance(self.env, RestorableEnv):  # whose restored states show exactly this, as the branching test checks
+            self._seen = {state.tobytes(): step[4] for state, step in zip(after, steps, strict=True)}
         rewards = np.array([step[1] for step in steps], dtype=np.float64)
         terminated = np.array([step[2] for step in steps], dtype=np.bool_)
         truncated = np.array([step[3] for step in steps], dtype=np.bool_)
@@ -69,8 +73,16 @@ class GetSetStateModel(Model):
         return following
 
     def observe(self, states: Array) -> Array:
-        """Return the observations [B, O] of states [B, D]."""
-        return self._observe(np.array(states, dtype=np.float64))
+        """Return the observations [B, O] of states [B, D]; the last steps have shown those of where they led."""
+        states = np.array(states, dtype=np.float64)
+        rows = [self._seen.get(state.tobytes()) for state in states]
+        if not rows or all(row is None for row in rows):
+            return self._observe(states)
+        missing = [index for index, row in enumerate(rows) if row is None]
+        if missing:
+            for index, row in zip(missing, self._observe(states[missing]), strict=True):
+                rows[index] = row
+        return np.array(rows)
 
     def goal_distance(self, states: Array) -> Array:
         """Return the distances [B] of states [B, D] to the goal."""
@@ -92,6 +104,7 @@ class GetSetStateModel(Model):
         steps = []
         for state, action in zip(states, actions, strict=True):
             env.set_env_state(state.copy())
-            _, reward, terminated, truncated, _ = env.step(action)
-            steps.append((as_vector(env, env.get_env_state()), float(reward), bool(terminated), bool(truncated)))
+            observation, reward, terminated, truncated, _ = env.step(action)
+            steps.append((as_vector(env, env.get_env_state()), float(reward), bool(terminated), bool(truncated),
+                          observation))
         return steps

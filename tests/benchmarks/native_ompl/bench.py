@@ -122,8 +122,8 @@ def search(model: Any, name: str, options: dict[str, Any], seed: int) -> Outcome
         seconds = time.thread_time() - began
         if planner.error is not None:
             raise planner.error
+        steps = 0 if planner.solution is None else len(planner.solution) - 1
         solved = problem.setup.haveExactSolutionPath()
-        steps = problem.setup.getSolutionPath().getControlCount() if solved else 0
     return Outcome(solved, counter.count, seconds, steps)
 
 
