@@ -77,8 +77,8 @@ def _draw_counts(record: dict[str, Any], figures: Path) -> None:
     model = make(*MAP)
     counts = np.array(record["counts"], dtype=float)
     outcome = "goal reached" if record["solved"] else "goal not reached"
-    figure, axes = map_axes(model, f"{_name(record['planner'])}, seed {record['seed']}: nodes in each bin of (x, y), in cells\n"
-                                f"after {record['transitions']:,} transitions, {outcome}")
+    figure, axes = map_axes(model, f"{_name(record['planner'])}, seed {record['seed']}: nodes in each bin of (x, y), "
+                                   f"in cells\nafter {record['transitions']:,} transitions, {outcome}")
     low, high = model.feature_low, model.feature_high
     image = axes.imshow(np.where(counts > 0, counts, np.nan).T, origin="lower", norm=LogNorm(1, max(2.0, counts.max())),
                         extent=(low[0], high[0], low[1], high[1]), zorder=1, interpolation="nearest")
