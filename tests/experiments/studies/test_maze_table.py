@@ -18,12 +18,16 @@ def record(label, size, index, solved, *, cost=100_000, skills=1):
 
 
 def table(pbcs, pb, ddpg, td3, *, follow=lambda *_: True, follow_cost=30_000, **options):
-    """Records of ten seeds a size; each method is a function of size and index that says whether it is solved."""
+    """Records of ten seeds a size, and of as many of PBCS as its bars need.
+
+    Each method is a function of size and index that says whether it is solved.
+    """
     methods = {"PBCS": pbcs, "PB": pb, "DDPG": ddpg, "TD3": td3}
     followed = [record("Follow", size, index, follow(size, index), cost=follow_cost)
                 for size in SIZES for index in range(10)]
     return followed + [record(label, size, index, solves(size, index), skills=size, **options)
-            for label, solves in methods.items() for size in SIZES for index in range(10)]
+            for label, solves in methods.items() for size in SIZES
+            for index in range(10 if label != "PBCS" else 80 if size < 10 else 20)]
 
 
 @pytest.fixture
@@ -65,25 +69,25 @@ def test_a_chain_that_took_more_than_the_others_had_is_not_held_against_them(ver
         claim = find(claims, f"PBCS solves more mazes than {label} (")
         assert claim.agrees is False
         assert claim.numbers["PBCS"]["successes"] == 0
-    assert find(claims, "70% of the mazes").agrees is True
+    assert find(claims, "95% of the mazes").agrees is True
 
 
 def test_four_runs_without_success_do_not_show_that_there_is_none(verdicts):
     records = [record(label, 2, index, False) for label in ("PBCS", "PB", "DDPG", "TD3") for index in range(4)]
     claims = verdicts(records)
     assert {text for text, claim in claims.items() if claim.agrees is not None} == {
-        text for text in claims if "70% of the mazes" in text or "PB regularly fails" in text}
+        text for text in claims if "95% of the mazes" in text or "PB regularly fails" in text}
     assert find(verdicts([*records, record("TD3", 2, 4, True)]), "TD3 alone solves some").agrees is True
 
 
 def test_pbcs_runs_first_and_then_the_others_in_balance():
     settings = STUDY.runs(STUDY.sweep, 20)
     labels = [one["label"] for one in settings]
-    assert len(settings) == 2 * (100 + 20 + 5 + 3) + 2 * (7 * 10 + 5 + 3) + 9 * 3 + 4 * 10 + 5 + 3
-    assert set(labels[:128]) == {"PBCS"}
-    assert [(one["label"], one["size"]) for one in settings[128:164]] == [
+    assert len(settings) == 2 * (100 + 40 + 5 + 3) + 2 * (7 * 10 + 5 + 3) + 9 * 3 + 4 * 10 + 5 + 3
+    assert set(labels[:148]) == {"PBCS"}
+    assert [(one["label"], one["size"]) for one in settings[148:184]] == [
         (label, size) for size in (*SIZES, 20, 30) for label in ("Follow", "PB", "DDPG", "TD3")]
-    assert {one["seed"] for one in settings[128:164]} == {500}
+    assert {one["seed"] for one in settings[148:184]} == {500}
     assert {one["planner"] for one in settings if one["label"] == "Follow"} == {"Rides"}
 
 
