@@ -75,7 +75,7 @@ class GetSetStateModel(Model):
     def observe(self, states: Array) -> Array:
         """Return the observations [B, O] of states [B, D]; the last steps have shown those of where they led."""
         states = np.array(states, dtype=np.float64)
-        rows = [self._seen.get(state.tobytes()) for state in states]
+        rows = [self._seen.get(state.tobytes()) for state in states] if self._seen else []
         if not rows or all(row is None for row in rows):
             return self._observe(states)
         missing = [index for index, row in enumerate(rows) if row is None]
