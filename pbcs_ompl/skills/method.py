@@ -16,7 +16,7 @@ from pbcs_ompl.results.schema import CheckpointVersion, CheckpointWords
 from pbcs_ompl.skills.trained_controller import TrainedController
 from pbcs_ompl.skills.trainer import SkillTrainer
 
-VERSION = 4
+VERSION = 5
 WORDS = "__plain__"
 """The array with the plain values, as JSON."""
 

@@ -42,7 +42,7 @@ class PBCSSettings(PlannedSettings):
         warm_start: A new skill starts from the networks of the skill before (ours).
         verify: Execute the complete chain with random actions until `gate` has an answer; where it refuses, PBCS trains
             the weakest skill again ([Matheron2020]: no).
-        gate: Of the complete chain.
+        gate: Of the complete chain. Each time that the judge refuses a verified chain, it allows half as many failures.
     """
 
     skill: SkillSettings = field(default_factory=SkillSettings)
@@ -75,7 +75,8 @@ class PBCS(TrainingMethod):
     Source: [Matheron2020] Alg. 6. Differs: the loop ends when a skill starts at index 0 (Alg. 7 never trains index 0,
     so that Alg. 6 would not end). With `verify`, the complete chain is executed once without random actions and, if it
     succeeds, with them until a sequential test has an answer; when it refuses, the skill in which most executions
-    failed is removed and the gap is trained again with new networks.
+    failed is removed and the gap is trained again with new networks. A chain that passes, and that
+    the judge refuses, has to pass a stricter test.
     """
 
     def __init__(self, trainer: SkillTrainer, settings: PBCSSettings):
@@ -84,6 +85,7 @@ class PBCS(TrainingMethod):
         self.links: list[ChainLink] = []
         """From the start to the goal; with a gap while one is being trained."""
         self.verified = not settings.verify
+        self._refusals = 0
         self.metric = trainer.observed_metric()
         self._train_between(0, trainer.waypoints.last)
 
@@ -96,6 +98,19 @@ class PBCS(TrainingMethod):
     def done(self) -> bool:
         """Whether the chain is complete and, if asked for, verified."""
         return self.complete and self.verified
+
+    @property
+    def refusals(self) -> int:
+        """How often the judge has refused the chain."""
+        return self._refusals
+
+    def refused(self) -> bool:
+        """Verify the chain again, by a stricter test, where chains are verified."""
+        if not self.settings.verify:
+            return False
+        self._refusals += 1
+        self.verified = False
+        return True
 
     @property
     def skills(self) -> list[Skill]:
@@ -172,15 +187,16 @@ class PBCS(TrainingMethod):
     def _verify(self) -> None:
         """Test the complete chain; where it is refused, remove the skill in which most executions failed."""
         trainer, settings = self.trainer, self.settings
+        gate = settings.gate.with_failures(0.5 ** self._refusals)
         chain = SkillChain.of(self.skills, trainer.waypoints, settings.steps_per_skill)
         failures = self._failures(chain, 1, 0.0)
         verdict = False if len(failures) else None
         trials = 0
         while verdict is None:
-            count = min(max(trials, FIRST_TRIALS), settings.gate.most_needed(trials - len(failures), trials))
+            count = min(max(trials, FIRST_TRIALS), gate.most_needed(trials - len(failures), trials))
             failures = np.concatenate([failures, self._failures(chain, count, settings.episodes.epsilon)])
             trials += count
-            verdict = settings.gate.verdict(trials - len(failures), trials)
+            verdict = gate.verdict(trials - len(failures), trials)
         self.verified = verdict
         if not verdict:
             weakest = self.links.pop(int(np.bincount(failures).argmax()))
@@ -207,7 +223,8 @@ class PBCS(TrainingMethod):
                          "links": [[link.start, link.end, kind_of(link.activation), entry_kinds(link.entry)]
                                    for link in self.links],
                          "end": self.end, "min_index": self.min_index, "verified": self.verified,
-                         "backplay": self.backplay.to_dict(), "policies": len(policies)}, arrays)
+                         "refusals": self._refusals, "backplay": self.backplay.to_dict(),
+                         "policies": len(policies)}, arrays)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Resume from what `snapshot` returned."""
@@ -219,6 +236,7 @@ class PBCS(TrainingMethod):
                                 entry_from_arrays(kinds, snapshot.arrays, f"entry{index}"))
                       for index, (start, end, kind, kinds) in enumerate(plain["links"])]
         self.end, self.min_index, self.verified = plain["end"], plain["min_index"], plain["verified"]
+        self._refusals = plain["refusals"]
         self.trainer.restore(plain["trainer"], {name: array for name, array in snapshot.arrays.items()
                                                 if not name.startswith(("policy", "activation", "entry"))})
         self.trainer.set_target(self.trainer.end_index, self._target_at(self.trainer.end_index))

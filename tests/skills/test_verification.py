@@ -80,6 +80,28 @@ def test_a_chain_that_fails_without_noise_is_not_tried_with_it(complete, monkeyp
     assert len(complete.links) == 2
 
 
+def test_a_verified_chain_that_the_judge_refuses_has_to_pass_a_stricter_test(complete, monkeypatch):
+    counts = scripted(monkeypatch, lambda epsilon, number: 1 if epsilon and number % 100 == 10 else None)
+    complete.step()
+    assert complete.done
+    assert counts[0.1] == 100
+    assert complete.refused()
+    assert not complete.done
+    again = PBCS(complete.trainer, complete.settings)
+    again.restore(complete.snapshot())
+    assert (again.refusals, again.verified, again.complete) == (1, False, True)
+    middle = again.links[1]
+    again.step()
+    assert 110 < counts[0.1] <= 300
+    assert (again.min_index, again.end) == (middle.start, middle.end)
+
+
+def test_a_chain_that_was_never_verified_is_not_trained_on(trainer):
+    method = PBCS(trainer, method_settings("pbcs", "thesis"))
+    assert not method.refused()
+    assert method.refusals == 0
+
+
 def test_failures_are_counted_in_the_environment(complete):
     before = complete.trainer.counter.count
     found = complete._failures(complete.chain(3), 4, 0.1)
