@@ -1,6 +1,7 @@
 """Episodes that were exported are read by the tools that the formats belong to, and are what they were here."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
@@ -10,6 +11,7 @@ import pytest
 import pbcs_ompl
 from pbcs_ompl.core.errors import InvalidOption, Mismatch, MissingDependency, RunFolderError, UnknownName
 from pbcs_ompl.results.export import export
+from tests.results.export.controllers import follow_chain
 from tests.skills.test_chain import MODEL, round_the_corner
 
 MAZE = {"size": 2}
@@ -133,8 +135,12 @@ def test_what_does_not_fit_is_refused_in_one_line(plan: Path, chain: Path, tmp_p
         export(chain, "onx", out=tmp_path / "a")
     with pytest.raises(InvalidOption, match="holds no controller"):
         export(plan, "numpy", out=tmp_path / "b")
-    with pytest.raises(InvalidOption, match="pbcs distill"):
+    with pytest.raises(InvalidOption, match=r"has \d that take over from each other; .*pbcs distill"):
         export(chain, "sb3", out=tmp_path / "c")
+    follower = follow_chain().controller
+    replace(follower, policies=follower.policies[:1], firsts=(0,)).save(tmp_path / "f")
+    with pytest.raises(InvalidOption, match=r"where it is on its line; .*pbcs distill"):
+        export(tmp_path / "f", "sb3", out=tmp_path / "g", episodes=1)
     with pytest.raises(InvalidOption, match="pbcs compare"):
         export(plan, "planner-arena", out=tmp_path / "d")
     with pytest.raises(RunFolderError, match="not empty"):
