@@ -31,6 +31,7 @@ from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Counter, ProgressCallback, Solution
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.adapters.vectorised import VectorisedModel
+from pbcs_ompl.resettable.known_goal import check_goal
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.checksums import SUMS
 from pbcs_ompl.results.files import CONFIG, PROVENANCE, RESULT, TRAJECTORY, TREE, write_errors
@@ -145,6 +146,7 @@ def plan(env: str | EnvSpec | gymnasium.Env | ResettableModel, planner: Any = "R
     allowance = None if improve is None else Allowance.of(improve)
     model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options,
                  max_episode_steps=max_episode_steps)
+    check_goal(model)
     spec = PlannerSpec(planner, planner_kwargs or {})
     config = {"kind": "plan", "planner": spec.name, "seed": seed, **limits._asdict(),
               "environment": model.spec.to_dict(), "planner_kwargs": spec.options, "versions": planning_versions(),

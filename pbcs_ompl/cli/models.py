@@ -4,6 +4,7 @@ from typing import Any
 
 from pbcs_ompl.cli.streams import print_error
 from pbcs_ompl.core.interfaces import ResettableModel
+from pbcs_ompl.core.tree import Tree
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.resettable.adapters.restorable import RestorableEnv
 from pbcs_ompl.resettable.adapters.success_flag import SuccessFlagEnv
@@ -34,10 +35,16 @@ def feature_words(model: ResettableModel) -> str:
 
 def goal_words(model: ResettableModel) -> str:
     """Return what a success is."""
-    rule = model.spec.goal or "what the environment reports"
     env = model.env
+    rule = model.spec.goal or _unnamed_goal(env)
     measured = env.has_goal_distance if isinstance(env, RestorableEnv) else not isinstance(env, SuccessFlagEnv)
     return f"{rule} (distance < {model.goal_threshold:g})" if measured else rule
+
+
+def _unnamed_goal(env: Any) -> str:
+    if isinstance(env, RestorableEnv) and env.reports_success is False and not env.has_goal_distance:
+        return "not known" if env.goal_is_unknown else "the end of an episode with a positive reward"
+    return "what the environment reports"
 
 
 def note_rules(model: ResettableModel) -> None:
@@ -47,6 +54,15 @@ def note_rules(model: ResettableModel) -> None:
         if model.spec.feature is None and len(model.feature_low) > MANY:
             print_error(f"hint      {len(model.feature_low)} numbers are explored; the fewer, the fewer transitions: "
                         "choose those that matter, as in --feature 'obs[0:2]'")
+
+
+def ends_hint(model: ResettableModel, tree: Tree) -> list[tuple[str, str]]:
+    """Return a line where episodes have ended, and only the reward could have said that this was the goal."""
+    ends = int(tree.terminal.sum())
+    if not ends or model.spec.goal is not None or getattr(model.env, "reports_success", None) is not False:
+        return []
+    return [("hint", f"{ends} nodes end an episode, none with a positive reward; if the end is the goal, say so: "
+                     "--goal 'terminated>0'")]
 
 
 def _vector(values: Array) -> str:

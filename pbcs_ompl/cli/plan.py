@@ -7,7 +7,7 @@ from pbcs_ompl.bridge.plan import PlanResult, plan
 from pbcs_ompl.cli.arguments import environment
 from pbcs_ompl.cli.finished import finished_plan
 from pbcs_ompl.cli.folders import fresh_folder
-from pbcs_ompl.cli.models import note_rules
+from pbcs_ompl.cli.models import ends_hint, note_rules
 from pbcs_ompl.cli.pictures import draw_tree
 from pbcs_ompl.cli.terminal import ProgressDisplay, list_files, print_summary
 from pbcs_ompl.core.formatting import format_duration, format_number
@@ -37,7 +37,7 @@ def run(arguments: Namespace) -> int:
         from pbcs_ompl.figures.video import write_video
 
         write_video(model, result.trajectory.states, arguments.video)
-    summary, lines, done = result.summary(), _closing_lines(arguments, result, out), result.solved
+    summary, lines, done = result.summary(), _closing_lines(arguments, model, result, out), result.solved
     if driver is not None and result.solved and result.trajectory is not None:
         followed = driver.drive(result.trajectory)
         summary, lines = summary | {"followed": followed.summary()}, [*lines[:-2], driver.words(followed), *lines[-2:]]
@@ -53,7 +53,8 @@ def _plan(arguments: Namespace, model: ResettableModel, out: Path) -> PlanResult
                     improve=arguments.improve, on_progress=display)
 
 
-def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[tuple[str, str]]:
+def _closing_lines(arguments: Namespace, model: ResettableModel, result: PlanResult,
+                   out: Path) -> list[tuple[str, str]]:
     rate = format_number(result.transitions / max(result.seconds, 1e-9))
     effort = (f"{format_number(result.transitions)} transitions, {format_duration(result.seconds)} "
               f"({rate} transitions/s)")
@@ -70,6 +71,7 @@ def _closing_lines(arguments: Namespace, result: PlanResult, out: Path) -> list[
         lines.append(("FAILED", str(result.reason)))
         following = command(["doctor", *environment_words(environment(arguments))])
     else:
+        lines += ends_hint(model, result.tree)
         following = "the same with a larger --max-transitions or --max-seconds, or another --planner"
     return [*lines, ("files", list_files(out)), ("next", following)]
 

@@ -20,6 +20,7 @@ from pbcs_ompl.core.plain import plain
 from pbcs_ompl.core.types import Counter
 from pbcs_ompl.experiments.run import Run, check_number_of_seeds
 from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.known_goal import check_goal
 from pbcs_ompl.resettable.make import is_known
 from pbcs_ompl.results.provenance import planning_versions
 
@@ -108,6 +109,8 @@ def make_sweep(planners: Sequence[str] | Mapping[str, Options], environments: Se
     if improve is not None:
         Allowance.of(improve)
     models = [make(environment) for environment in environments]
+    for model in models:
+        check_goal(model)
     resolved = {name: _resolved(name, given, models[0]) for name, given in options.items()}
     return Sweep(resolved, list(environments), chosen, *limits, max_memory, improve,
                  planning_versions())

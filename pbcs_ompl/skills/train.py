@@ -17,6 +17,7 @@ from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.ompl_access import quiet_ompl
 from pbcs_ompl.core.types import Counter, ProgressCallback
 from pbcs_ompl.resettable import make
+from pbcs_ompl.resettable.known_goal import check_goal
 from pbcs_ompl.resettable.rules import FeatureRule, GoalRule
 from pbcs_ompl.results.checksums import changed_files
 from pbcs_ompl.results.files import CHECKPOINT, CONFIG, PLAN, RESULT, is_there, read_json, read_toml
@@ -77,6 +78,7 @@ def train(env: str | EnvSpec | gymnasium.Env | ResettableModel, *, trajectory: T
     """
     model = make(env, env_kwargs, goal=goal, feature=feature, start_seed=start_seed, reset_options=reset_options,
                  max_episode_steps=max_episode_steps)
+    check_goal(model)
     config = TrainConfig.resolve(
         method=method or usual_method(preset, model), planner=planner, planner_kwargs=planner_kwargs, agent=agent,
         preset=preset, settings=settings, agent_settings=agent_settings, seed=seed, max_transitions=max_transitions,

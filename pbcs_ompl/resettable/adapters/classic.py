@@ -151,6 +151,11 @@ class VectorEnv(RestorableEnv):
         """Return whether an outcome is a success: by the goal that was given, else as the environment grants it."""
         return granted_success(outcome) if self.goal_rule is None else super().is_success(outcome)
 
+    @property
+    def goal_is_unknown(self) -> bool:
+        """Whether the goal is unknown: no distance to it is declared either."""
+        return super().goal_is_unknown and self._offers.goal_distance is None
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         """Reset the environment, and keep what is observed."""
         outcome = super().reset(seed=seed, options=options)

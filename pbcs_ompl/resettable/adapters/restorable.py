@@ -17,6 +17,7 @@ from pbcs_ompl.resettable.actions import copied
 from pbcs_ompl.resettable.feature_bounds import feature_bounds, narrow_words
 from pbcs_ompl.resettable.observations import flat, has_goals
 from pbcs_ompl.resettable.rules import (
+    SUCCESS,
     FeatureRule,
     GoalRule,
     Outcome,
@@ -53,6 +54,10 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
     """Whether steps are made only to see what range the feature has: no state of theirs is restored."""
     largest = UNBOUNDED
     """No number that is saved is larger."""
+    reports_success: bool | None = None
+    """Whether the environment reports in each step if it is a success; None where nothing was explored."""
+    rewards_any_step = False
+    """Whether exploration has seen a positive reward for a step that ended nothing."""
     goal_radius = 1.0
     """A state is a success if its distance to the goal is smaller, where the environment reports one."""
 
@@ -160,6 +165,11 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         """Return whether an outcome is a success."""
         return bool(self._is_success(outcome))
 
+    @property
+    def goal_is_unknown(self) -> bool:
+        """Whether neither what the environment reports nor the reward of a last step says what a success is."""
+        return self.goal_rule is None and self.reports_success is False and self.rewards_any_step
+
     def difference(self, states: Array, others: Array) -> Array:
         """Return the differences [B, K] between saved states [B, S] that `distance` measures, before features."""
         return np.empty((len(states), 0))
@@ -242,6 +252,9 @@ class RestorableEnv(gymnasium.Env[Array, Array], ABC):
         if not len(self._head):
             raise CallbackFailed("the feature function returned no numbers")
         success = self.is_success(outcome)
+        if self.exploring:
+            self.reports_success = bool(self.reports_success) or any(key in outcome.info for key in SUCCESS)
+            self.rewards_any_step |= outcome.reward > 0.0 and not outcome.terminated
         reported = None if self.goal_rule is not None else self.reported_goal_distance(self.named)
         self.has_goal_distance = reported is not None
         if reported is None:

@@ -67,8 +67,8 @@ def _only_policy(controller: TrainedController) -> SkillPolicy:
     if not isinstance(controller, SkillChain) or controller.num_policies != 1:
         more = (f"has {controller.num_policies} that take over from each other" if controller.num_policies > 1
                 else "also shows its network where it is on its line")
-        raise InvalidOption(f"stable-baselines3 has one network that sees the observation alone, this controller {more}; "
-                            "distill it first: pbcs distill DIR")
+        raise InvalidOption("stable-baselines3 has one network that sees the observation alone, this controller "
+                            f"{more}; distill it first: pbcs distill DIR")
     policy = controller.skills[0].policy
     if not policy.actor.is_plain:
         raise InvalidOption("the layers of this policy are normalised, those of stable-baselines3 are not; distill it "
