@@ -27,9 +27,7 @@ def run(arguments: Namespace) -> int:
     """Run, analyse, report. Returns 1 when a run failed; claims that are false are results, not failures."""
     if arguments.list:
         titles = study_ids()
-        width = max(map(len, titles))
-        print_summary({"studies": titles}, [(f"{name:<{width}}", title) for name, title in titles.items()],
-                      as_json=arguments.json)
+        print_summary({"studies": titles}, list(titles.items()), as_json=arguments.json)
         return 0
     if arguments.id is None:
         raise InvalidOption("the id of a study is missing; pbcs study --list shows them all")

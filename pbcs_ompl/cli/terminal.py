@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 SECONDS_BETWEEN_LINES = 10.0
 FORESEEN, SETTLED = 0.05, 5.0
 """The time left is shown once this share is done, or after this many seconds: before, it is a wild guess."""
+FIRST_COLUMN = 9
+"""Characters, unless a name is longer."""
 AT_ONCE = 1.0
 """What is reported in fewer seconds was there before: runs that were read, for instance."""
 
@@ -103,7 +105,8 @@ def _bar(label: str) -> "Bar | None":
 def print_summary(result: dict[str, Any], lines: Sequence[tuple[str, str]], *, as_json: bool) -> None:
     """Print the closing summary, and the JSON object as the last line on stdout if it was asked for."""
     show = print_error if as_json else print_output
-    show(*(printable(f"{name:<9} {text}") for name, text in lines))
+    width = max([FIRST_COLUMN, *(len(name) for name, _ in lines)])
+    show(*(printable(f"{name:<{width}} {text}") for name, text in lines))
     if as_json:
         print_output(json.dumps(result, default=plain))
 

@@ -37,6 +37,8 @@ def test_json_is_the_last_line_on_stdout_and_all_there_is(capsys):
 def test_a_summary_for_people_goes_to_stdout(capsys):
     print_summary({"solved": True}, [("solved", "in no time")], as_json=False)
     assert capsys.readouterr().out == "solved    in no time\n"
+    print_summary({}, [("planner", "solved"), ("my_module:Newest", "5/5")], as_json=False)
+    assert capsys.readouterr().out == "planner          solved\nmy_module:Newest 5/5\n"
 
 
 def test_progress_without_a_terminal_is_a_line_now_and_then_with_rate_and_time_left(capsys, monkeypatch):
