@@ -20,6 +20,8 @@ from pbcs_ompl.envs.walls_fcl import WallsFcl
 ANGLE = 2
 """The place of the angle in the state, after (x, y)."""
 NO_INTEGERS = np.zeros(1, dtype=np.int64)
+BORDER = 0.1
+"""How thick the walls around the world are."""
 
 
 class BodyEnv(gymnasium.Env[Array, Array], ABC):
@@ -27,7 +29,8 @@ class BodyEnv(gymnasium.Env[Array, Array], ABC):
 
     The state is (x, y, angle, speeds...), the angle in [-pi, pi); the observation is the state, then the cosine and the
     sine of the angle. A `goal_distance` is in tolerances, so that the threshold is 1. Controls outside of the box are
-    clipped. Nothing is random. A subclass says how bodies move (`kernel`, a compiled step).
+    clipped. Nothing is random. A subclass says how bodies move (`kernel`, a compiled step). `walls` are the obstacles
+    and the border of the world, for pictures and lines; steps know the border without.
 
     Args:
         settings: What the kernels take.
@@ -58,8 +61,9 @@ class BodyEnv(gymnasium.Env[Array, Array], ABC):
             raise InvalidOption(f"render_mode={render_mode!r}: expected 'rgb_array' or None")
         self.render_mode, self.max_episode_steps = render_mode, max_episode_steps
         self.settings, self.half_edges, self.ahead = np.array(settings, dtype=np.float64), half_edges, ahead
-        self.walls = _checked_obstacles(obstacles, extent)
-        self._fcl = WallsFcl(self.walls)
+        self.obstacles = _checked_obstacles(obstacles, extent)
+        self.walls = np.concatenate([self.obstacles, _border(extent)])
+        self._fcl = WallsFcl(self.obstacles)
         low, high = np.array(speeds, dtype=np.float64).T
         self.state_low = np.concatenate([[0.0, 0.0, -np.pi], low])
         self.state_high = np.concatenate([[extent, extent, np.pi], high])
@@ -76,7 +80,7 @@ class BodyEnv(gymnasium.Env[Array, Array], ABC):
 
     def compiled_step(self) -> CompiledStep:
         """Return the step as a function for compiled planners; see `core.step_kernels.STEP_SIGNATURE`."""
-        return type(self).kernel, self.settings, self.walls, NO_INTEGERS
+        return type(self).kernel, self.settings, self.obstacles, NO_INTEGERS
 
     def is_valid(self, states: Array) -> BoolArray:
         """Return which states [B, D] are within the bounds and, by FCL, touch no wall [B]."""
@@ -128,7 +132,7 @@ class BodyEnv(gymnasium.Env[Array, Array], ABC):
         if len(states) != len(controls):
             raise InvalidOption(f"got {len(controls)} controls for {len(states)} states")
         address = address_of(type(self).kernel)
-        return Transition(*step_batch(address, self.settings, self.walls, NO_INTEGERS, states, controls))
+        return Transition(*step_batch(address, self.settings, self.obstacles, NO_INTEGERS, states, controls))
 
     def get_env_state(self) -> Array:
         """Return the state [D]."""
@@ -161,7 +165,7 @@ class BodyEnv(gymnasium.Env[Array, Array], ABC):
         if self.render_mode is None:
             return None
         x, y, angle = self.poses(self._state[None])[0]
-        return rasterise(float(self.state_high[0]), self.walls, self.goal_circle,
+        return rasterise(float(self.state_high[0]), self.obstacles, self.goal_circle,
                          OrientedBox(x, y, angle, *self.half_edges))
 
     def _observation(self) -> Array:
@@ -192,3 +196,10 @@ def _checked_obstacles(obstacles: Sequence[Sequence[float]], extent: float) -> A
         raise InvalidOption(f"obstacles={walls.tolist()}: expected rectangles (x0, y0, x1, y1) within "
                             f"[0, {extent:g}]^2, x0 < x1 and y0 < y1")
     return walls
+
+
+def _border(extent: float) -> Array:
+    """Return the rectangles [4, 4] around a world [0, extent]^2."""
+    low, high = -BORDER, extent + BORDER
+    return np.array([(low, low, high, 0.0), (low, extent, high, high), (low, 0.0, 0.0, extent),
+                     (extent, 0.0, high, extent)])

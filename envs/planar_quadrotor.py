@@ -8,6 +8,7 @@ from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.envs import quadrotor_kernels
 from pbcs_ompl.envs.body_env import BodyEnv
+from pbcs_ompl.envs.upright_robot import UprightRobot
 
 EXTENT = 6.0
 HALF_EDGES = 0.3, 0.06
@@ -50,6 +51,7 @@ class PlanarQuadrotorEnv(BodyEnv):
 
     feature_dims = (0, 1, 3, 4)
     kernel = quadrotor_kernels.compiled_step
+    robot = UprightRobot.of(observation_size=8, action_size=2)
 
     def __init__(self, *, obstacles: Sequence[Sequence[float]] = OBSTACLES, start: Sequence[float] = START,
                  goal: Sequence[float] = GOAL, terminate_on_success: bool = True, render_mode: str | None = None):

@@ -152,7 +152,8 @@ def _plan(verb: Parser) -> None:
     _add_improve(verb)
     verb.add_argument("--video", metavar="FILE", help="film the path that was found; .mp4 or .gif")
     verb.add_argument("--follow", metavar="FOLLOWER",
-                      help="let a robot's follower (a folder of pbcs train, ant or ant-d4rl) drive along it, smoothed")
+                      help="let a robot's follower (a folder of pbcs train, or ant, ant-d4rl, quadrotor) drive along "
+                           "it, smoothed")
     verb.add_argument("--episodes", type=integer(1), metavar="N", help="of --follow: number of executions (30)")
     verb.add_argument("--epsilon", type=fraction, metavar="X", help="of --follow: fraction of random actions (0)")
     _add_out(verb)
@@ -191,7 +192,8 @@ def _train(verb: Parser) -> None:
 
 def _eval(verb: Parser) -> None:
     """run a trained controller many times from the start"""
-    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train, ant or ant-d4rl: two come with pbcs")
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train; or ant, ant-d4rl, quadrotor: these come with "
+                                                 "pbcs")
     verb.add_argument("--path", metavar="DIR", help="of a follower: the plan to drive along, a folder of pbcs plan")
     verb.add_argument("--env", metavar="ID", help="of a follower, without --path: drive the shortest way to the goal")
     verb.add_argument("--env-kwargs", type=json_object, default={}, metavar="JSON",
@@ -260,7 +262,8 @@ def _view(verb: Parser) -> None:
 
 def _export(verb: Parser) -> None:
     """write a result folder in the format of another tool"""
-    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train, plan, distill or compare, ant or ant-d4rl")
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train, plan, distill or compare; or ant, ant-d4rl, "
+                                                 "quadrotor")
     verb.add_argument("--to", required=True, type=Choice("format", FORMATS), metavar="FORMAT",
                       help="a controller: numpy, onnx; episodes: minari, maniskill, csv; both: sb3; a comparison: "
                            "planner-arena, csv")

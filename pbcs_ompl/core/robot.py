@@ -33,7 +33,7 @@ class Robot(Protocol):
     """What an environment declares of its robot, in its attribute `robot`: one policy serves all directions.
 
     Attributes:
-        place: The entries of the observation that are its place (x, y); the explored feature as well.
+        place: The entries of the observation that are its place (x, y); the explored feature begins with it.
         symmetries: Ways to see it, the identity first.
     """
 
@@ -49,7 +49,10 @@ class Robot(Protocol):
         ...
 
     def turned(self, observations: Array, angles: Array) -> Array:
-        """Return what observations [B, O] would be if the whole world were turned by angles [B] about the origin."""
+        """Return what observations [B, O] would be if the whole world were turned by angles [B] about the origin.
+
+        A robot whose heading is always 0 is never turned.
+        """
         ...
 
     def put(self, states: Array, places: Array, angles: Array) -> Array:

@@ -145,7 +145,7 @@ def test_pictures_show_the_body_the_goal_and_the_walls(env_id: str) -> None:
     picture, scale = env.render(), 480 / env.state_high[0]
     x, y, _ = env.poses(env.get_env_state()[None])[0]
     assert tuple(picture[479 - int(y * scale), int(x * scale)]) == (205, 50, 50)
-    for colour, area in (((40, 40, 46), np.prod(env.walls[:, 2:] - env.walls[:, :2], axis=1).sum()),
+    for colour, area in (((40, 40, 46), np.prod(env.obstacles[:, 2:] - env.obstacles[:, :2], axis=1).sum()),
                          ((120, 200, 120), np.pi * env.goal_circle[2] ** 2)):
         assert (picture == colour).all(axis=2).sum() == pytest.approx(area * scale**2, rel=0.1)
     boxes = np.isin(picture[..., 0], (205, 110)) & (picture[..., 1] < 60)
@@ -165,3 +165,14 @@ def test_pictures_show_the_body_the_goal_and_the_walls(env_id: str) -> None:
 def test_impossible_options(env_id: str, options: dict[str, object], error: type[Exception], complaint: str) -> None:
     with pytest.raises(error, match=complaint):
         make(env_id, **options).reset()
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_walls_have_the_border_and_steps_do_not(env_id: str) -> None:
+    env = make(env_id)
+    extent = env.state_high[0]
+    _, _, obstacles, _ = env.compiled_step()
+    np.testing.assert_array_equal(env.walls[:-4], obstacles)
+    border = env.walls[-4:]
+    assert ((border[:, 2:] <= 0.0) | (border[:, :2] >= extent)).any(axis=1).all()  # outside, each on one side
+    assert np.prod(border[:, 2:] - border[:, :2], axis=1).sum() == pytest.approx((extent + 0.2) ** 2 - extent ** 2)

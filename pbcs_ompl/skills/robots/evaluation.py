@@ -10,7 +10,7 @@ import numpy as np
 from pbcs_ompl.bridge.trajectory import Trajectory
 from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.env_spec import EnvSpec
-from pbcs_ompl.core.errors import InvalidOption, Mismatch
+from pbcs_ompl.core.errors import InvalidOption, Mismatch, MissingDependency
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.options import check_range
 from pbcs_ompl.core.seeding import SeedTree
@@ -96,7 +96,7 @@ def followers_of(model: ResettableModel) -> list[str]:
     """Return the names of the followers that come with the package and were trained for the robot of a model."""
     found = []
     for name, folder in shipped_followers().items():
-        with suppress(Mismatch):
+        with suppress(Mismatch, MissingDependency):
             check_robot(RobotFollower.load(folder), model)
             found.append(name)
     return found

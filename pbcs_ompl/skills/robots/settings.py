@@ -74,6 +74,8 @@ class RobotSettings(Settings):
         progress_reward: For each unit of length along the line.
         success_reward: At its end.
         effort: Cost of the squared actions, in half-widths of the box.
+        stray_cost: Cost of a step for each unit of length away from the line.
+        crash_cost: Cost of an episode that the environment terminates.
         progress_length: Length l of the discount exp(-progress / l): with a discount by time alone, to dash and fall is
             worth more than to walk.
         patience: Steps without progress after which an episode has failed.
@@ -90,6 +92,8 @@ class RobotSettings(Settings):
     progress_reward: float = 5.0
     success_reward: float = 10.0
     effort: float = 0.02
+    stray_cost: float = 0.0
+    crash_cost: float = 0.0
     progress_length: float = 4.0
     patience: int = 30
     max_steps: int = 300
@@ -103,4 +107,4 @@ class RobotSettings(Settings):
         self._check_positive("progress_length")
         self._check_fractions("epsilon")
         self._check_counts("patience", "max_steps", "robots", "horizon", "test_transitions", "test_steps")
-        self._check_at_least(0, "progress_reward", "success_reward", "effort")
+        self._check_at_least(0, "progress_reward", "success_reward", "effort", "stray_cost", "crash_cost")

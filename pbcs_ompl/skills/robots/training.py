@@ -134,7 +134,8 @@ class RobotTraining:
         terminal = reached | fallen | stalled
         over = terminal | ended | (walks.steps >= settings.max_steps)
         effort = np.square(np.clip(drawn.inner[0], -1.0, 1.0)).sum(axis=1)
-        rewards = settings.progress_reward * gains + settings.success_reward * reached - settings.effort * effort
+        rewards = (settings.progress_reward * gains + settings.success_reward * reached - settings.effort * effort
+                   - settings.stray_cost * self._strayed() - settings.crash_cost * fallen)
         continues = np.where(terminal, 0.0, np.exp(-gains / settings.progress_length))
         following = self._inputs(walks)
         kept = (inputs, drawn.inner[0], drawn.log_densities[0], rewards, drawn.values[0],
@@ -167,6 +168,13 @@ class RobotTraining:
         near = np.linalg.norm(places - lines.at(lines.last), axis=1) < radius
         reached: BoolArray = near & ((lines.last - pointers) * lines.spacing <= 2.0 * radius)
         return reached
+
+    def _strayed(self) -> Array:
+        """Return the distances [B] of the walks from their pointers, lengths."""
+        walks = self.walks
+        away: Array = np.linalg.norm(self.view.places(walks.observations)
+                                     - self.worlds.lines[walks.rows].at(walks.progress.pointers), axis=1)
+        return away
 
     def _mark(self, gains: Array, reached: BoolArray) -> None:
         """Keep states from which an episode has advanced, and mark new ones."""

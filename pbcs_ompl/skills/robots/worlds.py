@@ -52,10 +52,17 @@ def robot_of(model: ResettableModel) -> Robot:
 
 
 def free_space(model: ResettableModel, clearance: float) -> FreeSpace:
-    """Return the free space in the plane of a model's feature."""
-    if len(model.feature_low) != 2:
-        raise Mismatch(f"{model.spec.id} explores {len(model.feature_low)} dimensions; lines need a plane of two")
-    return FreeSpace(model.walls, model.feature_low, model.feature_high, clearance)
+    """Return the free space in the plane of the robot's place, with which the explored feature has to begin.
+
+    Raises:
+        Mismatch: it begins with something else.
+    """
+    state = model.initial_state(0)[None]
+    place = model.observe(state)[0, list(robot_of(model).place)]
+    if not np.array_equal(model.feature(state)[0, :2], place):
+        raise Mismatch(f"{model.spec.id} explores {model.feature(state)[0].tolist()} in its first state, where the "
+                       f"robot is at {place.tolist()}; lines need a feature that begins with the robot's place")
+    return FreeSpace(model.walls, model.feature_low[:2], model.feature_high[:2], clearance)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,15 +3,18 @@
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pbcs_ompl
+from pbcs_ompl.agents.ppo import PPOSettings
 from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.cli import main
 from pbcs_ompl.core.errors import DamagedFile, InvalidOption, InvalidState, Mismatch, RunFolderError
 from pbcs_ompl.core.seeding import SeedTree
+from pbcs_ompl.envs.planar_quadrotor import PlanarQuadrotorEnv
 from pbcs_ompl.results.files import read_toml, write_toml
 from pbcs_ompl.skills.path_following.follower import Progress
 from pbcs_ompl.skills.path_following.line import Line
@@ -23,6 +26,7 @@ from pbcs_ompl.skills.robots.lines import Lines
 from pbcs_ompl.skills.robots.settings import RobotSettings
 from pbcs_ompl.skills.robots.starts import Pool
 from pbcs_ompl.skills.robots.train import FollowerResult, resume_follower, train_follower
+from pbcs_ompl.skills.robots.training import RobotTraining
 from pbcs_ompl.skills.robots.view import KEEP_SIDE, RobotView
 from pbcs_ompl.skills.robots.worlds import Worlds, free_space
 
@@ -30,6 +34,7 @@ POINT = {"lines_per_world": 20, "tests_per_world": 5, "longest": 6.0, "clearance
          "far": 0.4, "window": 0.3, "goal_radius": 0.15, "patience": 15, "max_steps": 150, "advance": 0.5,
          "test_transitions": 20_000, "test_steps": 400, "effort": 0.0}
 """Settings for a point that moves 0.1 in a step."""
+QUADROTOR = {"lines_per_world": 5, "tests_per_world": 1, "longest": 6.0, "clearance": 0.4, "stumbles": 10}
 AGENT = {"hidden": [32, 32], "initial_std": 0.4}
 WORLDS = [{"size": 3}, {"size": 4, "maze_seed": 5}, {"size": 4, "maze_seed": 6}]
 
@@ -95,6 +100,50 @@ def test_random_lines_are_free_long_and_differ() -> None:
         assert space.distance(line.points).min() > 0.05
     with pytest.raises(InvalidState, match="choose shorter ones"):
         space.random_lines(2, np.random.default_rng(0), longest=1000.0, spacing=0.05)
+
+
+class Fast(PlanarQuadrotorEnv):
+    """What is explored are speeds."""
+
+    feature_dims = (3, 4)
+
+
+def test_lines_of_an_upright_robot_lie_in_its_plane_and_keep_clear_of_the_border() -> None:
+    model = pbcs_ompl.make("pbcs/PlanarQuadrotor-v0")
+    space = free_space(model, 0.4)
+    for line in space.random_lines(10, np.random.default_rng(0), longest=6.0, spacing=0.05):
+        assert line.points.min() > 0.3
+        assert line.points.max() < 5.7
+    with pytest.raises(Mismatch, match="begins with the robot's place"):
+        free_space(pbcs_ompl.make(Fast()), 0.4)
+
+
+@pytest.mark.parametrize(("cost", "expected"), [("stray_cost", "away"), ("crash_cost", "ended")])
+def test_straying_and_crashing_cost_what_the_settings_say(cost: str, expected: str) -> None:
+    """Two trainings that differ in a cost alone make the same first steps, and differ in these rewards alone."""
+    model = pbcs_ompl.make("pbcs/PlanarQuadrotor-v0")
+    kept: list[dict[str, Any]] = []
+    for price in (0.0, 3.0):
+        settings = RobotSettings().updated(QUADROTOR | {cost: price})
+        training = RobotTraining(Worlds.of([model], settings.lines, SeedTree(0)), settings, PPOSettings(), 0)
+        steps, inputs, sums = 200, training._inputs(training.walks), {"reward": 0.0, "away": 0.0, "ended": 0.0}
+        advance = training._advance
+
+        def watched(walks: Any, controls: Any, advance: Any = advance, sums: Any = sums,
+                    training: Any = training) -> Any:
+            found = advance(walks, controls)
+            sums["ended"] += found[2].sum()
+            sums["away"] += training._strayed().sum()
+            return found
+
+        training._advance = watched  # type: ignore[method-assign]
+        for _ in range(steps):
+            inputs, part = training._step(inputs)
+            sums["reward"] += part[3].sum()
+        kept.append(sums)
+    free, costly = kept
+    assert free[expected] == costly[expected] > 0
+    assert free["reward"] - costly["reward"] == pytest.approx(3.0 * free[expected])
 
 
 def test_training_and_test_lines_are_apart() -> None:

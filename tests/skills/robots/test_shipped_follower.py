@@ -13,11 +13,12 @@ from pbcs_ompl.skills.robots.evaluation import followers_of
 from pbcs_ompl.skills.robots.follower import shipped_followers
 from pbcs_ompl.skills.robots.shaking import CYCLE, waves
 
-pytest.importorskip("mujoco")
+ANTS = [name for name in shipped_followers() if name.startswith("ant")]
 
 
 @pytest.fixture(scope="module")
 def ant() -> RobotFollower:
+    pytest.importorskip("mujoco")
     return RobotFollower.shipped("ant")
 
 
@@ -25,6 +26,7 @@ def ant() -> RobotFollower:
     ("ant", {}), ("ant", {"size": 4, "maze_seed": 503}), ("ant", {"map": "umaze", "goal_radius": 0.45}),
     ("ant-d4rl", {"ant": "d4rl"})])
 def test_the_ant_walks_to_the_goal(name: str, options: dict) -> None:
+    pytest.importorskip("mujoco")
     found = evaluate_follower(RobotFollower.shipped(name), "pbcs/AntMaze-v0", env_kwargs={**options, "threads": 1},
                               episodes=4)
     assert found.successes >= 3, found
@@ -56,8 +58,9 @@ def test_no_two_joints_swing_together_for_long() -> None:
     np.testing.assert_array_equal(np.abs(controls), 1.0)
 
 
-@pytest.mark.parametrize("name", shipped_followers())
+@pytest.mark.parametrize("name", ANTS)
 def test_its_training_is_recorded_and_none_of_its_worlds_is_in_the_tables(name: str) -> None:
+    pytest.importorskip("mujoco")
     training = RobotFollower.shipped(name).training
     assert training["transitions"] > 500_000
     assert training["settings"]["patience"] == 30
@@ -65,7 +68,19 @@ def test_its_training_is_recorded_and_none_of_its_worlds_is_in_the_tables(name: 
     assert training["versions"]["mujoco"]
 
 
+def test_the_quadrotor_flies_a_plan_past_walls_that_it_never_saw(monkeypatch: pytest.MonkeyPatch) -> None:
+    obstacles = [[2.0, 0.0, 2.3, 3.2], [3.8, 2.6, 4.1, 6.0]]
+    model = pbcs_ompl.make("pbcs/PlanarQuadrotor-v0", {"obstacles": obstacles, "start": [1.0, 1.5, 0.0]})
+    follower = RobotFollower.shipped("quadrotor")
+    for episodes, epsilon, least in ((1, 0.0, 1), (20, 0.1, 16)):
+        found = evaluate_follower(follower, model, episodes=episodes, epsilon=epsilon, seed=1)
+        assert found.successes >= least, found
+    monkeypatch.setitem(__import__("sys").modules, "mujoco", None)  # its own robot is found without MuJoCo
+    assert followers_of(model) == ["quadrotor"]
+
+
 def test_the_command_line_knows_it_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mujoco")
     words = ["eval", "ant", "--env", "pbcs/AntMaze-v0", "--episodes", "2", "--json"]
     assert main(words) == 0
     assert json.loads(capsys.readouterr().out)["episodes"] == 2
