@@ -124,7 +124,7 @@ class Tracker(SideBySide):
 
     def _act(self, observations: Array, members: IndexArray) -> Any:
         self._states[members, 1:] = observations
-        return np.concatenate([self._each[k].act(observations[i][None]) for i, k in enumerate(members)])
+        return np.array([self._each[k].act(observations[i]) for i, k in enumerate(members)])
 
 
 @dataclass(frozen=True)
