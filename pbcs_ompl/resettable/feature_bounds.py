@@ -12,7 +12,7 @@ from pbcs_ompl.resettable.observations import flat_bounds
 from pbcs_ompl.resettable.rules import selected_dims
 
 EXPLORED_STEPS = 500
-GOAL_RESETS = 30
+RESETS = 30
 MARGIN = 1.0
 """What random steps have not reached is expected within this many times their range."""
 GOAL_MARGIN = 0.1
@@ -55,13 +55,19 @@ def feature_bounds(env: Any) -> FeatureBounds:
 
     Those of the environment where it has them. Else, for each dimension: where it is a number of the observation,
     whose space has finite bounds, these; else what random steps, always the same, reach from `reset`, widened on both
-    sides by itself. Where the feature is the achieved goal, desired goals that resets have shown lie inside.
+    sides by itself. Where the feature is the achieved goal, desired goals that resets have shown lie inside. Where
+    random steps hardly move it, as a thing that they do not touch, so do places that resets have shown.
     """
     given = env.feature_box()
     if given is not None:
         return FeatureBounds(given[0], given[1], "the environment")
     seen = _explore(env)
     low, high = seen.features.min(axis=0), seen.features.max(axis=0)
+    hardly = _narrow(high - low)
+    if hardly.any():
+        placed = _placed(env)
+        low = np.where(hardly, np.minimum(low, placed.min(axis=0)), low)
+        high = np.where(hardly, np.maximum(high, placed.max(axis=0)), high)
     extent = high - low
     widen = np.maximum(MARGIN * extent, LEAST_RANGE)
     low, high = low - widen, high + widen
@@ -73,8 +79,23 @@ def feature_bounds(env: Any) -> FeatureBounds:
     beyond = GOAL_MARGIN * (np.fmax(high, goals[1]) - np.fmin(low, goals[0]))
     low = np.where(extended, np.fmin(low, goals[0] - beyond), low)
     high = np.where(extended, np.fmax(high, goals[1] + beyond), high)
-    narrow = ~known & ~extended & (extent < np.maximum(LEAST_RANGE, NARROW * extent.max()))
+    narrow = ~known & ~extended & _narrow(extent)
     return FeatureBounds(low, high, _source(known, extended), tuple(np.flatnonzero(narrow).tolist()))
+
+
+def _narrow(extent: Array) -> BoolArray:
+    """Return which dimensions hardly move, of the ranges [F] of all."""
+    hardly: BoolArray = extent < np.maximum(LEAST_RANGE, NARROW * extent.max())
+    return hardly
+
+
+def _placed(env: Any) -> Array:
+    """Return the features [N, F] where episodes begin."""
+    features = []
+    for seed in range(RESETS):
+        env.reset(seed=seed)
+        features.append(env.get_env_state()[:len(env.feature_dims)])
+    return np.array(features)
 
 
 def narrow_words(bounds: FeatureBounds) -> str:
@@ -107,7 +128,7 @@ def _explore(env: Any) -> _Seen:
             env.reset(seed=int(rng.integers(2**31)))
     achieved, desired = _entries(named, "achieved_goal"), None
     if achieved is not None:
-        for _ in range(GOAL_RESETS):
+        for _ in range(RESETS):
             env.reset(seed=int(rng.integers(2**31)))
             named.append(env.named)
         desired = _entries(named, "desired_goal")

@@ -16,7 +16,7 @@ from pbcs_ompl.agents.update import one_thread
 from pbcs_ompl.core.checked import checked
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.seeding import SeedTree
-from pbcs_ompl.core.types import Array, Counter, IndexArray, ProgressCallback
+from pbcs_ompl.core.types import Array, BoolArray, Counter, IndexArray, ProgressCallback
 from pbcs_ompl.resettable import make
 from pbcs_ompl.resettable.task import Task
 from pbcs_ompl.results.files import CHAIN
@@ -155,18 +155,18 @@ def distill(teacher: TrainedController, *, settings: dict[str, Any] | None = Non
     chosen = DistillSettings().updated(settings or {})
     model = make(teacher.environment)
     if out is None:
-        return _Distillation(teacher, model, chosen, seed, on_progress).run(None)
+        return Distillation(teacher, model, chosen, seed, on_progress).run(None)
     with RunFolder(out) as folder:
         folder.write_config({"kind": "distill", "chain": source, "settings": chosen.to_dict(), "seed": seed,
                              "environment": model.spec.to_dict()})
-        result = _Distillation(teacher, model, chosen, seed, on_progress).run(str(folder.path))
+        result = Distillation(teacher, model, chosen, seed, on_progress).run(str(folder.path))
         result.chain.save(folder.path / CHAIN)
         folder.write_result(result.summary())
         return result
 
 
-class _Distillation:
-    """The states seen so far, and the network that is fitted to them."""
+class Distillation:
+    """The states seen so far, and the network that is fitted to them; see `distill`."""
 
     def __init__(self, teacher: TrainedController, model: ResettableModel, settings: DistillSettings, seed: int,
                  on_progress: ProgressCallback | None):
@@ -185,7 +185,7 @@ class _Distillation:
         """Make the rounds, choose a student, let the judge execute it and its teacher."""
         began = time.perf_counter()
         with one_thread():
-            student, rounds = self._rounds()
+            student, rounds = self.rounds()
         seconds = time.perf_counter() - began
         task, criterion = Task(self.model.spec, self.model.make_env), CriterionSettings()
         judged = [evaluate_chain(chain, task, episodes=episodes, epsilon=epsilon, seed=self.seed + JUDGED)
@@ -194,7 +194,7 @@ class _Distillation:
         return DistillResult(student, judged[0], judged[1], judged[2], judged[3], rounds, self.counter.count,
                              self.updates, seconds, self.seed, out)
 
-    def _rounds(self) -> tuple[SkillChain, int]:
+    def rounds(self) -> tuple[SkillChain, int]:
         """Return the best student, and how many rounds were made."""
         settings = self.settings
         self._collect(None)
@@ -251,9 +251,14 @@ class _Distillation:
                 break
         if student is None:
             self.longest = step + 1
+        trusted = self.trusted(success)
         for members, seen, controls in kept:
-            self.observations.append(seen[success[members]])
-            self.labels.append(controls[success[members]])
+            self.observations.append(seen[trusted[members]])
+            self.labels.append(controls[trusted[members]])
+
+    def trusted(self, success: BoolArray) -> BoolArray:
+        """Return in which episodes [B] the teacher's actions are advice, of which ones succeeded [B]."""
+        return success
 
     def _normalise(self) -> None:
         """Let the network see observations with mean 0 and deviation 1 over the states of the first round."""

@@ -46,7 +46,8 @@ def pages() -> list[str]:
 
 
 def plain_words(line: str) -> str:
-    """Return a line whose identifiers are split into words."""
+    """Return a line whose identifiers are split into words, without Adroit's door, which is one."""
+    line = re.sub(r"adroit(hand|-|'s )? ?door", "adroit", line, flags=re.IGNORECASE)
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", line).replace("_", " ")
 
 

@@ -85,6 +85,26 @@ def test_a_dimension_that_never_moves_is_reported() -> None:
     assert "hardly move dimension 1" in feature_words(model)
 
 
+def test_starts_of_what_random_steps_do_not_touch_lie_inside() -> None:
+    class Scattered(Pushed):
+        def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+            super().reset(seed=seed)
+            self.ball = self.np_random.uniform(-1.0, 1.0, 2)
+            return self._seen(), {}
+
+        def step(self, action: Any) -> Any:
+            self.hand = np.clip(self.hand + action, -2.0, 2.0)
+            return self._seen(), 0.0, False, False, {}
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model = adapt(Scattered(), feature="obs[4:6],achieved_goal")
+    for seed in range(50):
+        place = Scattered().reset(seed=seed)[0]["achieved_goal"]
+        assert (model.feature_low[2:] < place).all()
+        assert (place < model.feature_high[2:]).all()
+
+
 def test_what_moves_is_not_reported() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -183,3 +183,12 @@ def test_a_k_d_tree_in_random_order_is_logarithmic_and_in_sorted_order_a_list():
 @pytest.mark.parametrize(("size", "steps"), [(2, 11), (3, 43)])
 def test_the_fewest_steps_through_a_maze(size, steps):
     assert trees.fewest_steps(make("pbcs/Maze-v0", {"size": size})) == steps
+
+
+def test_a_task_of_closed_loop_may_have_fewer_seeds_and_methods():
+    study = find_study("closed-loop")
+    tasks = {"all": {"env": "pbcs/Disc-v0"}, "few": {"env": "pbcs/Disc-v0", "seeds": 2, "without": ["lqr"]}}
+    methods = {"lqr": {"seeds": 3, "episodes": 1}, "follow": {"seeds": 3, "episodes": 1}}
+    names = [run.name for run in replace(study, sweep=study.sweep | {"tasks": tasks, "methods": methods}).all_runs(20)]
+    assert sorted(names) == sorted([f"all-{method}-{index}" for method in methods for index in range(3)]
+                                   + ["few-follow-0", "few-follow-1"])

@@ -36,7 +36,8 @@ def runs(sweep: dict[str, Any], seeds: int) -> list[dict[str, Any]]:
              "seed": sweep["first_seed"] + index, **common,
              **{key: value for key, value in (options | budget).items() if key not in ("seeds", "without")}}
             for method, budget in sweep["methods"].items() for index in range(min(seeds, budget["seeds"]))
-            for task, options in sweep["tasks"].items() if method not in options.get("without", ())]
+            for task, options in sweep["tasks"].items()
+            if method not in options.get("without", ()) and index < options.get("seeds", seeds)]
 
 
 def run(settings: dict[str, Any]) -> dict[str, Any]:
