@@ -84,7 +84,7 @@ def test_compare_in_several_environments_with_options(pbcs, tmp_path):
     assert [row["environment"] for row in found["rows"]] == [labels[0], labels[0], labels[1], labels[1]]
     assert [test["environment"] for test in found["tests"]] == labels
     assert all(f"in         {label}\n" in error for label in labels)  # as wide as "RandomWalk"
-    assert "pair      Ex needs less than RandomWalk in" in error
+    assert "pair       Ex needs less than RandomWalk in" in error
     assert {"compare.png", "coverage.png", "comparison.db", "comparison-1-Maze-v0.log", "comparison-2-Box-v0.log"} < \
         {path.name for path in (tmp_path / "both").iterdir()}
     assert "bin_size = 0.3" in (tmp_path / "both/comparison-1-Maze-v0.log").read_text()
