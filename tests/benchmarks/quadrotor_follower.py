@@ -68,6 +68,16 @@ def lines(follower: RobotFollower, model: ResettableModel, seed: int) -> Iterato
             yield name, None
 
 
+def interval(successes: list[int], episodes: int) -> list[float]:
+    """Return the 95 % interval of a rate: Wilson's, or of the bootstrap over worlds, whose executions are alike."""
+    if episodes == 1:
+        bounds = wilson(sum(successes), len(successes))
+    else:
+        drawn = np.random.default_rng(0).choice(successes, (2000, len(successes))).mean(axis=1) / episodes
+        bounds = tuple(np.quantile(drawn, [0.025, 0.975]).tolist())
+    return [round(bound, 3) for bound in bounds]
+
+
 def main() -> None:
     """Print a line of JSON for each kind of line and noise."""
     parser = argparse.ArgumentParser()
@@ -78,20 +88,20 @@ def main() -> None:
     follower = (RobotFollower.load(given.follower) if Path(given.follower).is_dir()
                 else RobotFollower.shipped(given.follower))
     found: dict[tuple[str, float], list[int]] = {}
+    without: dict[str, int] = {}
     for seed in range(given.seed, given.seed + given.worlds):
         model = model_of(seed)
         for kind, line in lines(follower, model, seed):
+            if line is None:
+                without[kind] = without.get(kind, 0) + 1
+                continue
             for noise, episodes in ((0.0, 1), (0.1, EPISODES)):
-                numbers = found.setdefault((kind, noise), [0, 0, 0])
-                if line is None:
-                    numbers[2] += 1
-                    continue
                 one = drive(follower, model, line, episodes=episodes, epsilon=noise, seed=seed)
-                numbers[0] += one.successes
-                numbers[1] += one.episodes
-    for (kind, noise), (successes, count, without) in found.items():
-        print(json.dumps({"line": kind, "noise": noise, "successes": successes, "of": count, "no line": without,
-                          "wilson": [round(bound, 3) for bound in wilson(successes, count)]}))
+                found.setdefault((kind, noise), []).append(one.successes)
+    for (kind, noise), successes in found.items():
+        episodes = EPISODES if noise else 1
+        print(json.dumps({"line": kind, "noise": noise, "successes": sum(successes), "of": episodes * len(successes),
+                          "no line": without.get(kind, 0), "interval": interval(successes, episodes)}))
 
 
 if __name__ == "__main__":

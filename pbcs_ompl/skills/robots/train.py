@@ -4,7 +4,7 @@ import json
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +88,10 @@ def train_follower(env: str | EnvSpec, *, env_kwargs: dict[str, Any] | None = No
     if isinstance(env, EnvSpec) and env_kwargs:
         raise InvalidOption("options of the environment go with its id; this spec has its own")
     spec = env if isinstance(env, EnvSpec) else EnvSpec(env, env_kwargs or {})
+    unused = [name for name in ("goal", "feature") if getattr(spec, name) is not None]
+    if unused:
+        raise InvalidOption(f"{' and '.join(unused)} of {spec.label} would not be used: lines of a follower lie in the "
+                            "plane of the robot's place, and end anywhere; leave them out")
     if worlds is not None and not worlds:
         raise InvalidOption("worlds is empty; expected options of at least one world, or None")
     if max_transitions < 1:
@@ -147,8 +151,7 @@ class _Run:
 
     def training(self) -> RobotTraining:
         """Return the training as new."""
-        models = [make(EnvSpec(self.spec.id, {**self.spec.kwargs, **world}, trusted=self.spec.trusted))
-                  for world in self.worlds]
+        models = [make(replace(self.spec, kwargs={**self.spec.kwargs, **world})) for world in self.worlds]
         worlds = Worlds.of(models, self.settings.lines, SeedTree(self.seed))
         return RobotTraining(worlds, self.settings, self.agent_settings, self.seed)
 

@@ -25,7 +25,7 @@ from pbcs_ompl.skills.robots.free_space import FreeSpace
 from pbcs_ompl.skills.robots.lines import Lines
 from pbcs_ompl.skills.robots.settings import RobotSettings
 from pbcs_ompl.skills.robots.starts import Pool
-from pbcs_ompl.skills.robots.train import FollowerResult, resume_follower, train_follower
+from pbcs_ompl.skills.robots.train import FollowerResult, _Run, resume_follower, train_follower
 from pbcs_ompl.skills.robots.training import RobotTraining
 from pbcs_ompl.skills.robots.view import KEEP_SIDE, RobotView
 from pbcs_ompl.skills.robots.worlds import Worlds, free_space
@@ -229,9 +229,20 @@ def test_a_resumed_training_is_the_uninterrupted_one(tmp_path: Path) -> None:
         train_follower("pbcs/Maze-v0", **arguments, out=tmp_path / "run")
 
 
+def test_worlds_keep_the_rest_of_the_task() -> None:
+    """A state that resets are given is that of all bodies."""
+    spec = pbcs_ompl.EnvSpec("pbcs/PlanarQuadrotor-v0", reset_options={"state": [3.0, 1.0, 0.2, 0.0, 0.0, 0.0]})
+    worlds, settings = ({}, {"terminate_on_success": False}), RobotSettings().updated(QUADROTOR)
+    training = _Run(spec, worlds, settings, PPOSettings(), 0, 10**6, None).training()
+    assert (training.starts.standing[:, 2] == 0.2).all()
+    assert [model.spec.kwargs for model in training.worlds.models] == [{}, {"terminate_on_success": False}]
+
+
 def test_wrong_input_is_named(trained: FollowerResult) -> None:
     with pytest.raises(Mismatch, match="declares no robot"):
         train_follower("Pendulum-v1", settings=POINT)
+    with pytest.raises(InvalidOption, match=r"goal and feature of .* would not be used"):
+        train_follower(pbcs_ompl.EnvSpec("pbcs/Maze-v0", goal="obs[0]>1", feature="obs[0:2]"), settings=POINT)
     with pytest.raises(InvalidOption, match="worlds is empty"):
         train_follower("pbcs/Maze-v0", worlds=[])
     with pytest.raises(InvalidOption, match="'patience'"):
