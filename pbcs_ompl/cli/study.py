@@ -62,7 +62,7 @@ def _make(study: Study, arguments: Namespace, out: Path) -> int:
             records, failures = run_shard(study, shard, **options)
             failed = {name: failure.reason for name, failure in failures.items()}
             summary = {"id": study.id, "shard": str(shard), "runs": len(records), "failed": failed, "out": str(out)}
-            lines = [(study.id, f"shard {shard}: {len(records)} of {budget} runs"), *_failures(failed),
+            lines = [("study", f"{study.id}, shard {shard}: {len(records)} of {budget} runs"), *_failures(failed),
                      ("next", "the other shards, then the same command without --shard")]
     print_summary(summary, lines, as_json=arguments.json)
     return 1 if summary["failed"] else 0
@@ -84,7 +84,7 @@ def _emit(study: Study, arguments: Namespace, out: Path) -> int:
     with open_study(study, out, arguments.seeds):
         write_text(file, text)
     print_summary({"id": study.id, "runs": len(runs), "out": str(out), "file": str(file)},
-                  [(study.id, f"{len(runs)} runs in {file}"), ("next", following)], as_json=arguments.json)
+                  [("study", f"{study.id}: {len(runs)} runs in {file}"), ("next", following)], as_json=arguments.json)
     return 0
 
 
@@ -94,7 +94,7 @@ def _failures(failed: dict[str, str]) -> list[tuple[str, str]]:
 
 def _closing_lines(title: str, named: str, summary: dict[str, Any], out: Path) -> list[tuple[str, str]]:
     left_out, remedy = sum(summary["left_out"].values()), command([*study_words(named), "--out", str(out)])
-    lines = [(summary["id"], f"{title}: {summary['runs']} runs")]
+    lines = [("study", f"{summary['id']}, {summary['runs']} runs: {title}")]
     lines += [("left out", f"{left_out} runs; {remedy} makes them")] if left_out else []
     lines += [(VERDICTS[claim["agrees"]], in_one_line(claim)) for claim in summary["agrees"]]
     lines += _failures(summary["failed"])
