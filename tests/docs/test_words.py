@@ -46,8 +46,8 @@ def pages() -> list[str]:
 
 
 def plain_words(line: str) -> str:
-    """Return a line whose identifiers are split into words, without Adroit's door, which is one."""
-    line = re.sub(r"adroit(hand|-|'s )? ?door", "adroit", line, flags=re.IGNORECASE)
+    """Return a line whose identifiers are split into words, without the ids of others."""
+    line = line.replace("AdroitHandDoorSparse-v1", "")
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", line).replace("_", " ")
 
 
