@@ -13,6 +13,8 @@ from pbcs_ompl.core.types import Array, BoolArray, Counter
 
 MAX_DRAWS = 200
 MAX_ROLLOUTS = 50
+PROPOSED_SHARE = 0.1
+"""Share of the rollouts that stay in the ball that a message proposes."""
 
 
 def uniform_in_ball(centre: Array, radius: float, count: int, rng: np.random.Generator) -> Array:
@@ -88,14 +90,19 @@ def roll_near(model: ResettableModel, state: Array, radius: float, count: int, r
         InvalidState: too few rollouts stay in the ball.
     """
     sources = state[None] if before is None else np.concatenate([before, state[None]])
-    found = np.empty((0, len(state)))
+    found, distances = np.empty((0, len(state))), np.empty(0)
     for _ in range(MAX_ROLLOUTS):
         if len(found) >= count:
             return found[:count]
         reached = _roll(model, sources[rng.integers(0, len(sources), count)], rng, rollout_steps, counter or Counter())
-        found = np.concatenate([found, reached[model.distance(reached, state) <= radius]])
+        away = model.distance(reached, state)
+        found, distances = np.concatenate([found, reached[away <= radius]]), np.concatenate([distances, away])
     if len(found) < count:
-        raise InvalidState(f"random rollouts leave the ball of radius {radius:g} around the state; take a larger one")
+        holding = float(np.quantile(distances, PROPOSED_SHARE)) if len(distances) else radius
+        raise InvalidState(
+            f"random rollouts leave the ball of radius {radius:g} around the state: {len(found)} of {len(distances)} "
+            f"end in it, expected {count}; {PROPOSED_SHARE:.0%} of them end within {holding:.2g}: take a larger radius "
+            f"(of a training, --settings '{{\"radius\": {max(holding, 2.0 * radius):.2g}}}')")
     return found[:count]
 
 

@@ -23,7 +23,7 @@ from pbcs_ompl.skills.agent_interface import Agent, AgentFactory, AgentSettingsV
 from pbcs_ompl.skills.method import TrainingMethod
 from pbcs_ompl.skills.path_following.follow import Follow
 from pbcs_ompl.skills.path_following.settings import FollowSettings
-from pbcs_ompl.skills.path_following.shown_feature import observes_feature
+from pbcs_ompl.skills.path_following.shown_feature import how_to_show, observes_feature
 from pbcs_ompl.skills.pbcs import PBCS, PBCSSettings
 from pbcs_ompl.skills.settings import MethodSettings, PlannedSettings, flat_names, read_preset
 from pbcs_ompl.skills.single_policy import (
@@ -85,8 +85,7 @@ def usual_method(preset: str, model: ResettableModel) -> str:
     method = str(read_preset(preset)["method"])
     if method == "follow" and not observes_feature(model):
         warnings.warn(f"{model.spec.id}: what is explored is no part of the observation, so no policy can follow a "
-                      "path; the method is pbcs (for the other, explore entries of the observation, such as "
-                      "--feature 'obs[0:2]')", stacklevel=3)
+                      f"path; the method is pbcs (to follow paths, {how_to_show(model)})", stacklevel=3)
         return "pbcs"
     return method
 

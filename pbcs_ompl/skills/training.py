@@ -27,6 +27,7 @@ from pbcs_ompl.results.schema import PlanEffort
 from pbcs_ompl.skills.config import METHODS, TrainConfig
 from pbcs_ompl.skills.criterion import Outcome, judged
 from pbcs_ompl.skills.method import TrainingMethod, restore, write_checkpoint
+from pbcs_ompl.skills.path_following.shown_feature import how_to_show, observes_feature
 from pbcs_ompl.skills.settings import PlannedSettings, PlanSettings
 from pbcs_ompl.skills.train_result import TrainResult
 from pbcs_ompl.skills.trainer import SkillTrainer
@@ -229,8 +230,10 @@ class Training:
 
     def _advice(self) -> str:
         """Return what to try when the budget is used up."""
-        other = "pbcs" if self.config.method == "follow" else "follow"
-        return f"Try a larger budget (a folder can be resumed), another seed, another plan, or the method {other!r}"
+        other = "the method 'pbcs'" if self.config.method == "follow" else "the method 'follow'"
+        if self.config.method != "follow" and not observes_feature(self.model):
+            other = f"to follow the path: {how_to_show(self.model)}"
+        return f"Try a larger budget (a folder can be resumed), another seed, another plan, or {other}"
 
     def _step(self, method: TrainingMethod) -> bool:
         """Make one step of the method; return whether the budget allowed it.

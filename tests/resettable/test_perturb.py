@@ -62,6 +62,19 @@ def test_rollouts_from_earlier_states_find_what_leads_to_the_state() -> None:
     assert 50 < counter.count < 2000
 
 
+def test_a_ball_that_rollouts_leave_is_answered_by_a_radius_that_holds_them() -> None:
+    """Random torques move the arm further than 0.01 in a step or two, from the state and from those before it."""
+    arm = make("Reacher-v5")
+    states = [arm.initial_state(0)]
+    for _ in range(12):
+        states.append(arm.transition(states[-1][None], arm.action_high[None]).states[0])
+    before, rng = np.array(states[:-1]), np.random.default_rng(0)
+    with pytest.raises(InvalidState, match=r"leave the ball of radius 0\.1 .*expected 20; 10% .*\"radius\": ") as refusal:
+        arm.perturb(states[-1], 0.01, 20, rng, before=before)
+    proposed = float(str(refusal.value).split('"radius": ')[1].split("}")[0])
+    assert len(arm.perturb(states[-1], proposed, 20, rng, before=before)) == 20
+
+
 @pytest.mark.parametrize("radius", [-0.1, float("nan"), float("inf")])
 def test_radii_out_of_range(radius: float) -> None:
     with pytest.raises(InvalidOption, match="radius"):

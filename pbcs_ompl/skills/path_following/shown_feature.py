@@ -1,5 +1,7 @@
 """How an observation shows the feature: as entries, or an angle by its cosine and sine."""
 
+import inspect
+import json
 from dataclasses import dataclass
 from typing import Self
 
@@ -16,6 +18,8 @@ WALK = 20
 TOLERANCE = 1e-5
 """Largest difference between a feature and what the observation shows of it, relative to its size."""
 NO_SINE = -1
+HIDES_POSITION = "exclude_current_positions_from_observation"
+"""The option of Gymnasium's robots that leaves their place out of the observation; it is on unless given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +46,7 @@ class ShownFeature:
         """Return where the observation shows the feature.
 
         Args:
-            model: It knows features, and the periods of angles.
+            model: It knows features.
             states: [N, D].
             observations: Those of the states [N, O].
 
@@ -51,13 +55,12 @@ class ShownFeature:
         """
         found = []
         for dimension, values in enumerate(model.feature(states).T):
-            place = _place(values, observations, float(model.feature_periods[dimension]))
+            place = _place(values, observations)
             if place is None:
                 raise Mismatch(
                     f"{model.spec.id}: dimension {dimension} of the feature is no entry of the observation, nor an "
                     "angle whose cosine and sine are, so a controller of observations cannot know where it is on the "
-                    f"line; explore entries of the observation (--feature 'obs[0:{observations.shape[1]}]'), or use "
-                    "another method than follow")
+                    f"line; {how_to_show(model)}, or use another method than follow")
             found.append(place)
         entries, sines = np.array(found, dtype=np.int64).T
         return cls(entries, sines)
@@ -69,6 +72,17 @@ class ShownFeature:
         shown[:, angles] = np.arctan2(observations[:, self.sines[angles]], shown[:, angles])
         return shown
 
+    def periods(self, declared: Array) -> Array:
+        """Return the period of each dimension as observations show it [F], 0 for none.
+
+        Cosine and sine show any angle within a turn only, also one that is declared without a period, such as that of a
+        joint whose soft limits let it pass half a turn.
+
+        Args:
+            declared: The period of each dimension of the feature [F], 0 for none.
+        """
+        return np.where(self.sines == NO_SINE, declared, 2.0 * np.pi)
+
     def moved(self, observations: Array, shifts: Array) -> Array:
         """Return observations [B, O] of which the entries that are the feature are larger by `shifts` [B, F].
 
@@ -79,7 +93,7 @@ class ShownFeature:
         return moved
 
 
-def _place(values: Array, observations: Array, period: float) -> tuple[int, int] | None:
+def _place(values: Array, observations: Array) -> tuple[int, int] | None:
     """Return the entry that shows some values [N] in observations [N, O], or the cosine and the sine that do."""
     tolerance = TOLERANCE * max(1.0, float(np.abs(values).max()))
     errors = np.abs(observations - values[:, None]).max(axis=0)
@@ -88,10 +102,17 @@ def _place(values: Array, observations: Array, period: float) -> tuple[int, int]
     cosine, sine = (int(np.abs(observations - shown[:, None]).max(axis=0).argmin())
                     for shown in (np.cos(values), np.sin(values)))
     away = np.arctan2(observations[:, sine], observations[:, cosine]) - values
-    if np.isclose(period, 2.0 * np.pi):
-        away -= period * np.rint(away / period)
+    away -= 2.0 * np.pi * np.rint(away / (2.0 * np.pi))
     lengths = np.hypot(observations[:, sine], observations[:, cosine])
     return (cosine, sine) if max(np.abs(away).max(), np.abs(lengths - 1.0).max()) <= tolerance else None
+
+
+def how_to_show(model: ResettableModel) -> str:
+    """Return what to do so that observations show what is explored."""
+    known = inspect.signature(type(getattr(model.env, "inner", model.env)).__init__).parameters
+    if HIDES_POSITION in known and model.spec.kwargs.get(HIDES_POSITION, True):
+        return f"let the robot observe its place, --env-kwargs '{json.dumps({HIDES_POSITION: False})}'"
+    return f"explore entries of the observation, such as --feature 'obs[0:{min(2, model.observation_size)}]'"
 
 
 def observes_feature(model: ResettableModel) -> bool:

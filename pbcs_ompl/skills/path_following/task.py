@@ -146,9 +146,9 @@ class FollowTask:
         if len(early):
             raise InvalidState(f"state {early[0]} of the plan is in the goal, where the episode ends, but the plan has "
                                f"{len(states) - 1} steps; cut it off there")
-        observations, periods = model.observe(states), model.feature_periods
+        observations = model.observe(states)
         shown = ShownFeature.of(model, states, observations)
-        features = shown(observations)
+        features, periods = shown(observations), shown.periods(model.feature_periods)
         steps = np.quantile(np.abs(np.diff(unwrapped(features, periods), axis=0)), STEP_QUANTILE, axis=0)
         unit = np.where(steps > 0, steps, 1.0)
         kept = erase_loops(features / unit, 1.0, periods / unit)

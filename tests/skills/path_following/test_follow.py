@@ -326,6 +326,21 @@ def test_a_feature_that_is_not_observed_is_refused() -> None:
         FollowTask.of(pendulum, states, LineSettings())
 
 
+def test_an_angle_without_a_period_is_followed_within_a_turn() -> None:
+    """The soft limits of the elbow let it pass half a turn, where its sine changes sign: the line goes on there."""
+    arm = make("Reacher-v5")
+    states, push = [arm.initial_state(0)[None]], np.array([[0.0, 1.0]])
+    for _ in range(40):
+        states.append(arm.transition(states[-1], push).states)
+    elbow = arm.feature(np.concatenate(states))[:, 1]
+    assert arm.feature_periods[1] == 0.0
+    assert np.abs(elbow).max() > np.pi
+    task = FollowTask.of(arm, np.concatenate(states[:int(np.abs(elbow).argmax()) + 1]), LineSettings())
+    along = task.line.points[:, 1] * task.view.unit[1]
+    assert np.abs(np.diff(along)).max() < 0.5
+    assert np.abs(along).max() > np.pi
+
+
 def test_an_angle_is_observed_by_its_cosine_and_sine() -> None:
     pendulum, states = swung()
     assert observes_feature(pendulum)
