@@ -69,7 +69,8 @@ def test_a_ball_that_rollouts_leave_is_answered_by_a_radius_that_holds_them() ->
     for _ in range(12):
         states.append(arm.transition(states[-1][None], arm.action_high[None]).states[0])
     before, rng = np.array(states[:-1]), np.random.default_rng(0)
-    with pytest.raises(InvalidState, match=r"leave the ball of radius 0\.1 .*expected 20; 10% .*\"radius\": ") as refusal:
+    refused = r"leave the ball of radius 0\.01 .*expected 20; 10% .*\"radius\": "
+    with pytest.raises(InvalidState, match=refused) as refusal:
         arm.perturb(states[-1], 0.01, 20, rng, before=before)
     proposed = float(str(refusal.value).split('"radius": ')[1].split("}")[0])
     assert len(arm.perturb(states[-1], proposed, 20, rng, before=before)) == 20

@@ -112,7 +112,7 @@ def how_to_show(model: ResettableModel) -> str:
     known = inspect.signature(type(getattr(model.env, "inner", model.env)).__init__).parameters
     if HIDES_POSITION in known and model.spec.kwargs.get(HIDES_POSITION, True):
         return f"let the robot observe its place, --env-kwargs '{json.dumps({HIDES_POSITION: False})}'"
-    return f"explore entries of the observation, such as --feature 'obs[0:{min(2, model.observation_size)}]'"
+    return f"explore entries of the observation, such as --feature 'obs[0:{min(3, model.observation_size)}]'"
 
 
 def observes_feature(model: ResettableModel) -> bool:
