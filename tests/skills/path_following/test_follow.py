@@ -327,7 +327,7 @@ def test_a_feature_that_is_not_observed_is_refused() -> None:
 
 
 def test_an_angle_without_a_period_is_followed_within_a_turn() -> None:
-    """The soft limits of the elbow let it pass half a turn, where its sine changes sign: the line goes on there."""
+    """The soft limits of the elbow let it pass half a turn, where its sine changes sign: the line continues there."""
     arm = make("Reacher-v5")
     states, push = [arm.initial_state(0)[None]], np.array([[0.0, 1.0]])
     for _ in range(40):
