@@ -4,7 +4,8 @@
 
 Mazes of `pbcs/AntMaze-v0` (RK4, no end when unhealthy, goal radius 0.8 m) with seeds from 500 on, shortest ways; its
 official maps (0.45 m); with --robotics those of gymnasium-robotics under their own ids, with the starts and goals that
-their resets draw (Gymnasium's ant only); with --plans plans of Ex instead of shortest ways.
+their resets draw (Gymnasium's ant only). With --planners Ex Rides each maze is planned in as well, and the smoothed
+plans are followed, as `pbcs plan --follow` does.
 """
 
 import argparse
@@ -15,11 +16,12 @@ import numpy as np
 
 import pbcs_ompl
 from pbcs_ompl.bridge.plan import plan
+from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.statistics import wilson
 from pbcs_ompl.envs.maze_maps import MazeMap
 from pbcs_ompl.skills import RobotFollower
 from pbcs_ompl.skills.path_following.line import Line
-from pbcs_ompl.skills.robots.evaluation import drive, planned_line, shortest_line
+from pbcs_ompl.skills.robots.evaluation import drive, shortest_line, smoothed_line
 from pbcs_ompl.skills.robots.free_space import FreeSpace
 
 CELL = 4.0
@@ -47,6 +49,17 @@ def robotics_line(follower: RobotFollower, name: str, observation: np.ndarray) -
     return space.line_between(observation[0:2], observation[2:4], follower.spacing)
 
 
+def planned(follower: RobotFollower, model: ResettableModel, planner: str, max_transitions: int) -> Line | None:
+    """Return the smoothed line of a plan, whose costs are printed; None where there is no plan within the budget."""
+    found = plan(model, planner, planner_kwargs={"control_duration": 10} if planner == "Ex" else {},
+                 max_transitions=max_transitions)
+    line = None if found.trajectory is None else smoothed_line(follower, model, found.trajectory.states)
+    print(json.dumps({"maze": model.spec.label, "planner": planner, "transitions": found.transitions,
+                      "seconds": round(found.seconds, 1), "metres": None if line is None else round(line.length, 1)}),
+          flush=True)
+    return line
+
+
 def main() -> None:
     """Print a line of JSON for each maze and noise, then one for each size."""
     parser = argparse.ArgumentParser()
@@ -57,7 +70,9 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=10)
     parser.add_argument("--seed", type=int, default=0, help="of the executions; resets of gymnasium-robotics count on "
                                                             "from 700 more")
-    parser.add_argument("--plans", type=int, default=0, help="plans of Ex in the 2x2 maze")
+    parser.add_argument("--planners", nargs="*", default=[], help="whose plans are followed, beside shortest ways")
+    parser.add_argument("--planned", type=int, default=5, help="mazes of each size that are planned in")
+    parser.add_argument("--max-transitions", type=int, default=3_000_000, help="of a plan")
     parser.add_argument("--robotics", type=int, default=0, help="resets of each map of gymnasium-robotics")
     given = parser.parse_args()
     follower, total = RobotFollower.load(given.follower), {}
@@ -73,12 +88,12 @@ def main() -> None:
     tasks = [(group, str(options), model, shortest_line(follower, model))
              for group, options in mazes(given.sizes, given.mazes)
              for model in [pbcs_ompl.make("pbcs/AntMaze-v0", {**options, **own})]]
-    for seed in range(600, 600 + given.plans):
-        options = {"control_duration": 10}
-        result = plan("pbcs/AntMaze-v0", "Ex", env_kwargs=own, planner_kwargs=options, seed=seed)
-        if result.trajectory is not None:
-            model = pbcs_ompl.make("pbcs/AntMaze-v0", own)
-            tasks.append(("2x2 along Ex", f"Ex {seed}", model, planned_line(follower, model, result.trajectory.states)))
+    for planner in given.planners:
+        for group, options in mazes(given.sizes, given.planned):
+            model = pbcs_ompl.make("pbcs/AntMaze-v0", {**options, **own})
+            line = planned(follower, model, planner, given.max_transitions)
+            if line is not None:
+                tasks.append((f"{group} along {planner}", str(options), model, line))
     for noise in given.noise:
         for group, name, model, line in tasks:
             count(group, noise, name, line, drive(
