@@ -8,6 +8,7 @@ from pbcs_ompl.core.errors import InvalidOption
 from pbcs_ompl.core.types import Array
 from pbcs_ompl.envs import car_kernels
 from pbcs_ompl.envs.body_env import BodyEnv
+from pbcs_ompl.envs.car_robot import CarRobot
 
 EXTENT = 8.0
 HALF_EDGES = 0.5, 0.25
@@ -48,6 +49,7 @@ class CarParkEnv(BodyEnv):
     feature_dims = (0, 1, 2)
     feature_periods = (0.0, 0.0, 2.0 * np.pi)
     kernel = car_kernels.compiled_step
+    robot = CarRobot(turning=WHEELBASE / np.tan(STEERING))
 
     def __init__(self, *, obstacles: Sequence[Sequence[float]] = OBSTACLES, start: Sequence[float] = START,
                  goal: Sequence[float] = GOAL, terminate_on_success: bool = True, render_mode: str | None = None):

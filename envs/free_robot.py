@@ -23,6 +23,7 @@ class FreeRobot:
     num_positions: int
     symmetries: tuple[Symmetry, ...]
     place: tuple[int, int] = (0, 1)
+    turning: float = 0.0
 
     def heading(self, observations: Array) -> Array:
         """Return the yaw [B] of the root."""

@@ -13,6 +13,7 @@ class PointRobot:
     """State and observation are its place (x, y); so is all that a follower sees of it, and nothing is left."""
 
     place: tuple[int, int] = (0, 1)
+    turning: float = 0.0
     symmetries: tuple[Symmetry, ...] = (Symmetry.identity(2, 2),)
 
     def heading(self, observations: Array) -> Array:

@@ -18,6 +18,7 @@ class UprightRobot:
 
     symmetries: tuple[Symmetry, ...]
     place: tuple[int, int] = (0, 1)
+    turning: float = 0.0
 
     @classmethod
     def of(cls, observation_size: int, action_size: int) -> "UprightRobot":

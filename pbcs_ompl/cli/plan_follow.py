@@ -55,7 +55,7 @@ class Driver:
 
     def drive(self, trajectory: Trajectory) -> Evaluation:
         """Let the follower drive along the smoothed plan."""
-        line = smoothed_line(self.follower, self.model, trajectory.states)
+        line = smoothed_line(self.follower, self.model, trajectory)
         return drive(self.follower, self.model, line, episodes=self.episodes, epsilon=self.epsilon, seed=self.seed)
 
     def words(self, found: Evaluation) -> tuple[str, str]:

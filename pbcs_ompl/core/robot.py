@@ -35,10 +35,13 @@ class Robot(Protocol):
     Attributes:
         place: The entries of the observation that are its place (x, y); the explored feature begins with it.
         symmetries: Ways to see it, the identity first.
+        turning: What a radian of its heading counts on lines, a length: a car that shall drive along a line has to look
+            along it too, or against it, and its radius of turns is that length. 0 where places alone make a line.
     """
 
     place: tuple[int, int]
     symmetries: tuple[Symmetry, ...]
+    turning: float
 
     def heading(self, observations: Array) -> Array:
         """Return the directions [B] in which it looks, in radians from the x axis; 0 where it has none."""
@@ -60,7 +63,7 @@ class Robot(Protocol):
         ...
 
 
-PARTS = ("place", "symmetries", "heading", "fallen", "turned", "put")
+PARTS = ("place", "symmetries", "turning", "heading", "fallen", "turned", "put")
 
 
 def missing_parts(robot: object) -> list[str]:

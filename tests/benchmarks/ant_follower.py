@@ -53,7 +53,7 @@ def planned(follower: RobotFollower, model: ResettableModel, planner: str, max_t
     """Return the smoothed line of a plan, whose costs are printed; None where there is no plan within the budget."""
     found = plan(model, planner, planner_kwargs={"control_duration": 10} if planner == "Ex" else {},
                  max_transitions=max_transitions)
-    line = None if found.trajectory is None else smoothed_line(follower, model, found.trajectory.states)
+    line = None if found.trajectory is None else smoothed_line(follower, model, found.trajectory)
     print(json.dumps({"maze": model.spec.label, "planner": planner, "transitions": found.transitions,
                       "seconds": round(found.seconds, 1), "metres": None if line is None else round(line.length, 1)}),
           flush=True)

@@ -59,8 +59,8 @@ def lines(follower: RobotFollower, model: ResettableModel, seed: int) -> Iterato
              for name in ("Rides", "Ex")}
     for name, plan in plans.items():
         if plan is not None:
-            yield f"plan of {name}", planned_line(follower, model, plan.states)
-    for name, make_line in (("smoothed", lambda: smoothed_line(follower, model, plans["Rides"].states)),
+            yield f"plan of {name}", planned_line(follower, model, plan)
+    for name, make_line in (("smoothed", lambda: smoothed_line(follower, model, plans["Rides"])),
                             ("shortest", lambda: shortest_line(follower, model))):
         try:
             yield name, make_line() if plans["Rides"] is not None else None

@@ -176,3 +176,18 @@ def test_walls_have_the_border_and_steps_do_not(env_id: str) -> None:
     border = env.walls[-4:]
     assert ((border[:, 2:] <= 0.0) | (border[:, :2] >= extent)).any(axis=1).all()  # outside, each on one side
     assert np.prod(border[:, 2:] - border[:, :2], axis=1).sum() == pytest.approx((extent + 0.2) ** 2 - extent ** 2)
+
+
+@pytest.mark.parametrize("angle", [0.3, -2.0, np.pi])
+def test_a_turned_car_moves_in_the_turned_direction(angle: float) -> None:
+    env = make("pbcs/CarPark-v0", obstacles=[], start=(4.0, 4.0, 0.0))
+    rng, count = np.random.default_rng(4), 50
+    states = np.column_stack([rng.uniform(3.0, 5.0, (count, 2)), rng.uniform(-np.pi, np.pi, count),
+                              rng.uniform(-1.0, 2.0, count)])
+    controls, angles = rng.uniform(-1.0, 1.0, (count, 2)), np.full(count, angle)
+    after = env.observe(env.transition(states, controls).states)
+    turned = env.observe(env.transition(env.robot.put(states, states[:, :2], angles), controls).states)
+    moved = env.robot.turned(after - np.pad(states[:, :2], ((0, 0), (0, 4))), angles)
+    np.testing.assert_allclose(turned[:, :2], moved[:, :2] + states[:, :2], atol=1e-12)
+    np.testing.assert_allclose(turned[:, 3:], moved[:, 3:], atol=1e-12)
+    np.testing.assert_allclose(np.cos(env.robot.heading(turned)), turned[:, 4], atol=1e-12)

@@ -78,7 +78,7 @@ def test_success_takes_no_part_in_distances_and_perturbations() -> None:
 
 def test_a_robot_is_put_into_states_with_the_flag() -> None:
     class Disc:
-        place, symmetries = (0, 1), ()
+        place, symmetries, turning = (0, 1), (), 0.0
 
         def heading(self, observations: np.ndarray) -> np.ndarray:
             return np.zeros(len(observations))
@@ -104,7 +104,8 @@ def test_an_attribute_that_is_called_robot_by_chance_does_no_harm() -> None:
 
     model = adapt(type("Moving", (Cart,), {"robot": Arm()})())
     assert len(model.initial_state(0)) == 3
-    with pytest.raises(Mismatch, match="has no symmetries, heading, fallen, turned, put; expected all of place"):
+    lacks = "has no symmetries, turning, heading, fallen, turned, put; expected all of place"
+    with pytest.raises(Mismatch, match=lacks):
         robot_of(model)
 
 

@@ -131,7 +131,7 @@ class _FlaggedRobot:
 
     def __init__(self, robot: Robot):
         self._robot = robot
-        self.place, self.symmetries = robot.place, robot.symmetries
+        self.place, self.symmetries, self.turning = robot.place, robot.symmetries, robot.turning
         self.heading, self.turned, self.fallen = robot.heading, robot.turned, robot.fallen
 
     def put(self, states: Array, places: Array, angles: Array) -> Array:

@@ -154,7 +154,7 @@ def _data(to: str, request: Request) -> ControllerData:
     trajectory = Trajectory.load(file, trust=request.trust)
     model = make(trajectory.environment)
     check_robot(controller, model)
-    return controller_data(controller, planned_line(controller, model, trajectory.states))
+    return controller_data(controller, planned_line(controller, model, trajectory))
 
 
 def _numpy(to: str, request: Request) -> Export:

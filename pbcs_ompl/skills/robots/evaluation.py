@@ -20,8 +20,11 @@ from pbcs_ompl.resettable.judge import Judge
 from pbcs_ompl.skills.evaluation import MOST_EPISODES, Evaluation
 from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.robots.follower import RobotFollower, shipped_followers
+from pbcs_ompl.skills.robots.places import places_of
 from pbcs_ompl.skills.robots.worlds import free_space, robot_of
 
+ONWARDS = 20
+"""The most steps by which a plan is continued in the goal (ours)."""
 EXTRA = 4
 """Patiences in the time limit of an execution, beside those for each near look-ahead of the line (ours)."""
 
@@ -56,7 +59,7 @@ def evaluate_follower(follower: RobotFollower,
     check_robot(follower, model)
     if trajectory is not None:
         trajectory.check_belongs_to(model)
-    line = shortest_line(follower, model) if trajectory is None else planned_line(follower, model, trajectory.states)
+    line = shortest_line(follower, model) if trajectory is None else planned_line(follower, model, trajectory)
     return drive(follower, model, line, episodes=episodes, epsilon=epsilon, seed=seed)
 
 
@@ -102,22 +105,48 @@ def followers_of(model: ResettableModel) -> list[str]:
     return found
 
 
-def planned_line(follower: RobotFollower, model: ResettableModel, states: Array) -> Line:
-    """Return the line along the states of a plan [T+1, D], and on to the centre of the goal where it is known."""
-    places = follower.view.places(model.observe(states))
-    centre = [] if model.goal_circle is None else [np.array([model.goal_circle[:2]])]
-    return follower.line_of(np.concatenate([places, *centre]))
+def planned_line(follower: RobotFollower, model: ResettableModel, trajectory: Trajectory) -> Line:
+    """Return the line along a plan, and on into the goal.
+
+    Where lines are of places alone it ends at the centre of the goal, if that is known; else in the middle of the
+    states in the goal to which the plan's last action leads, since a plan ends as soon as it is there.
+    """
+    robot = follower.view.robot
+    places = places_of(robot, model.observe(trajectory.states))
+    if robot.turning > 0.0:
+        onwards = places_of(robot, model.observe(_onwards(model, trajectory)))
+    else:
+        onwards = np.empty((0, 2)) if model.goal_circle is None else np.array([model.goal_circle[:2]])
+    return follower.line_of(np.concatenate([places, onwards]))
 
 
-def smoothed_line(follower: RobotFollower, model: ResettableModel, states: Array) -> Line:
-    """Return a line near the states of a plan [T+1, D] that keeps clear of walls, to the centre of the goal.
+def _onwards(model: ResettableModel, trajectory: Trajectory) -> Array:
+    """Return states [N, D] to which the last action of a plan leads: the first half of those in the goal."""
+    state, control = trajectory.states[-1:], trajectory.controls[-1:]
+    found: list[Array] = []
+    while len(found) < ONWARDS:
+        step = model.transition(state, control)
+        if not step.success[0] or np.array_equal(step.states, state):
+            break
+        state = step.states
+        found.append(state)
+    half = found[:(len(found) + 1) // 2]
+    return np.concatenate(half) if half else np.empty((0, len(model.state_low)))
 
-    Where the environment does not say where its goal is, it ends where the plan does.
+
+def smoothed_line(follower: RobotFollower, model: ResettableModel, trajectory: Trajectory) -> Line:
+    """Return a line near a plan that keeps clear of walls, to the centre of the goal.
+
+    Where the environment does not say where its goal is, it ends where the plan does. A robot whose heading counts
+    could not follow ways that were made without it: its line is that of the plan.
 
     Raises:
         InvalidState: no way leads there.
     """
-    places = follower.view.places(model.observe(states))
+    robot = follower.view.robot
+    if robot.turning > 0.0:
+        return planned_line(follower, model, trajectory)
+    places = places_of(robot, model.observe(trajectory.states))
     goal = places[-1] if model.goal_circle is None else np.array(model.goal_circle[:2])
     return free_space(model, follower.clearance).smoothed(places, goal, follower.spacing)
 
@@ -126,9 +155,12 @@ def shortest_line(follower: RobotFollower, model: ResettableModel) -> Line:
     """Return the line of the shortest way from a start to the goal that keeps clear of walls.
 
     Raises:
-        Mismatch: the environment has no `goal_circle`.
+        Mismatch: the environment has no `goal_circle`, or the heading of its robot counts.
         InvalidState: no way leads to the goal.
     """
+    if follower.view.robot.turning > 0.0:
+        raise Mismatch(f"the robot of {model.spec.id} cannot turn on the spot: what it follows is a plan; give one "
+                       "(--path PLAN), or plan and follow in one, pbcs plan --follow FOLLOWER")
     if model.goal_circle is None:
         raise Mismatch(f"{model.spec.id} does not say where its goal is (goal_circle); give a plan")
     start = follower.view.places(model.observe(model.initial_state(0)[None]))[0]

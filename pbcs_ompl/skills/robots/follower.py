@@ -19,8 +19,9 @@ from pbcs_ompl.resettable.actions import ActionMap, Actions
 from pbcs_ompl.results.files import read_bytes, read_json, write_json
 from pbcs_ompl.results.schema import Limit, Positive, Table, check
 from pbcs_ompl.skills.path_following.follower import Progress
-from pbcs_ompl.skills.path_following.line import Line, erase_loops
+from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
+from pbcs_ompl.skills.robots.places import dimensions, line_through
 from pbcs_ompl.skills.robots.shaking import CYCLE, waves
 from pbcs_ompl.skills.robots.view import RobotView
 from pbcs_ompl.skills.robots.worlds import robot_of
@@ -32,8 +33,6 @@ SHIPPED = Path(__file__).parent / "followers"
 LOST_AFTER = CYCLE
 """Steps without progress after which a pointer goes back to the nearest point that it has passed (ours). A robot that
 shakes behind a wall takes its pointer along the other side of it. After a cycle shaking continues without a jump."""
-GAP = 8.0
-"""Longest hop along each axis by which loops of a plan are erased, in spacings of lines (ours)."""
 
 
 class FollowerWords(TypedDict):
@@ -122,16 +121,17 @@ class RobotFollower:
             InvalidOption: the line is in no plane, or `entries` are of another number.
         """
         size = len(self.view.normaliser.origin) + 2
-        if line.points.shape[1] != 2:
-            raise InvalidOption(f"a line in {line.points.shape[1]} dimensions; a robot follows lines in its plane")
+        expected = dimensions(self.view.robot)
+        if line.points.shape[1] != expected:
+            raise InvalidOption(f"a line in {line.points.shape[1]} dimensions; expected {expected}, see `line_of`")
         if entries is not None and len(entries) != size:
             raise InvalidOption(f"{len(entries)} entries; expected the {size} of the robot's observation")
         return RobotController(self.policy, self.view, line, self.actions,
                                None if entries is None else np.array(entries, dtype=np.int64))
 
     def line_of(self, places: Array) -> Line:
-        """Return the line along the places [T+1, 2] of a plan, without its loops."""
-        return Line.through(places[erase_loops(places, GAP * self.spacing)], self.spacing)
+        """Return the line along the places [T+1, F] of a plan, without its loops; see `places.places_of`."""
+        return line_through(self.view.robot, places, self.spacing)
 
     @checked
     def save(self, folder: str | Path) -> None:

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from pbcs_ompl.core.types import Array, IndexArray
-from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.path_following.line import Line, whole_periods
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,12 +19,14 @@ class Lines:
         lasts: The pointers of the ends [L].
         spacings: Lengths between neighbouring points [L].
         rows: The line of each execution [B].
+        periods: Of the dimensions [F]; None where none has one. See `Line.periods`.
     """
 
     points: Array
     lasts: IndexArray
     spacings: Array
     rows: IndexArray
+    periods: Array | None = None
 
     @classmethod
     def of(cls, lines: Sequence[Line]) -> Self:
@@ -33,11 +35,11 @@ class Lines:
         points = np.stack([np.pad(line.points, ((0, longest - len(line.points)), (0, 0)), mode="edge")
                            for line in lines])
         return cls(points, np.array([line.last for line in lines]), np.array([line.spacing for line in lines]),
-                   np.arange(len(lines)))
+                   np.arange(len(lines)), lines[0].periods)
 
     def __getitem__(self, rows: IndexArray) -> "Lines":
         """Return the same lines with executions on some of them, by their indices [B]."""
-        return Lines(self.points, self.lasts, self.spacings, rows)
+        return Lines(self.points, self.lasts, self.spacings, rows, self.periods)
 
     @property
     def last(self) -> IndexArray:
@@ -54,6 +56,12 @@ class Lines:
         points: Array = self.points[self.rows, pointers]
         return points
 
+    def unwound(self, features: Array, pointers: IndexArray) -> Array:
+        """Return features [B, F] moved by whole periods; see `Line.unwound`."""
+        if self.periods is None:
+            return features
+        return features - whole_periods(features - self.at(pointers), self.periods)
+
     def advance(self, features: Array, pointers: IndexArray, window: float) -> IndexArray:
         """Return the pointers [B] moved forward; see `Line.advance`.
 
@@ -65,7 +73,8 @@ class Lines:
         reach = np.maximum(1, np.rint(window / self.spacing)).astype(np.int64)
         candidates = pointers[:, None] + np.minimum(np.arange(reach.max(initial=1) + 1), reach[:, None])
         candidates = np.minimum(candidates, self.last[:, None])
-        squares = ((self.points[self.rows[:, None], candidates] - features[:, None]) ** 2).sum(axis=2)
+        near = self.unwound(features, pointers)[:, None]
+        squares = ((self.points[self.rows[:, None], candidates] - near) ** 2).sum(axis=2)
         return np.take_along_axis(candidates, squares.argmin(axis=1)[:, None], axis=1)[:, 0]
 
     def ahead(self, features: Array, pointers: IndexArray, distances: Array) -> Array:
@@ -78,5 +87,5 @@ class Lines:
         """
         steps = np.rint(np.asarray(distances) / self.spacing[:, None]).astype(np.int64)
         places = np.minimum(pointers[:, None] + steps, self.last[:, None])
-        ahead: Array = self.points[self.rows[:, None], places] - features[:, None]
+        ahead: Array = self.points[self.rows[:, None], places] - self.unwound(features, pointers)[:, None]
         return ahead

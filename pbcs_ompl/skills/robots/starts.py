@@ -108,5 +108,10 @@ class StartDrawer:
 
     def _put(self, states: Array, rows: IndexArray, pointers: IndexArray, rng: np.random.Generator) -> Array:
         scatter = SCATTER * self.clearance
-        places = self.worlds.lines[rows].at(pointers) + rng.uniform(-scatter, scatter, (len(rows), 2))
-        return self.worlds.robot.put(states, places, rng.uniform(-np.pi, np.pi, len(rows)))
+        points, robot = self.worlds.lines[rows].at(pointers), self.worlds.robot
+        places = points[:, :2] + rng.uniform(-scatter, scatter, (len(rows), 2))
+        if robot.turning == 0.0:
+            return robot.put(states, places, rng.uniform(-np.pi, np.pi, len(rows)))
+        before = robot.heading(self.worlds.models[0].observe(states))
+        angles = points[:, 2] / robot.turning - before + rng.uniform(-scatter, scatter, len(rows)) / robot.turning
+        return robot.put(states, places, angles)

@@ -165,15 +165,16 @@ class RobotTraining:
 
     def _reached(self, lines: Any, places: Array, pointers: IndexArray) -> BoolArray:
         radius = self.settings.lines.goal_radius
-        near = np.linalg.norm(places - lines.at(lines.last), axis=1) < radius
+        near = np.linalg.norm(lines.ahead(places, lines.last, np.zeros(1))[:, 0], axis=1) < radius
         reached: BoolArray = near & ((lines.last - pointers) * lines.spacing <= 2.0 * radius)
         return reached
 
     def _strayed(self) -> Array:
         """Return the distances [B] of the walks from their pointers, lengths."""
         walks = self.walks
-        away: Array = np.linalg.norm(self.view.places(walks.observations)
-                                     - self.worlds.lines[walks.rows].at(walks.progress.pointers), axis=1)
+        lines = self.worlds.lines[walks.rows]
+        away: Array = np.linalg.norm(lines.ahead(self.view.places(walks.observations), walks.progress.pointers,
+                                                 np.zeros(1))[:, 0], axis=1)
         return away
 
     def _mark(self, gains: Array, reached: BoolArray) -> None:

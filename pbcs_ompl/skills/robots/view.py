@@ -10,6 +10,7 @@ from pbcs_ompl.skills.path_following.follower import Progress
 from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.policy import ObservationTransform
 from pbcs_ompl.skills.robots.lines import Lines
+from pbcs_ompl.skills.robots.places import dimensions, places_of
 
 KEEP_SIDE = np.pi / 3
 """A side leads as long as the line is less than this off its heading (ours): halfway between two sides is no border."""
@@ -41,12 +42,11 @@ class RobotView:
     @property
     def size(self) -> int:
         """Number I of inputs."""
-        return len(self.normaliser.origin) + 2 * len(self.distances) + 1
+        return len(self.normaliser.origin) + dimensions(self.robot) * len(self.distances) + 1
 
     def places(self, observations: Array) -> Array:
-        """Return the places [B, 2] that observations [B, O] show."""
-        places: Array = observations[:, list(self.robot.place)]
-        return places
+        """Return the places [B, F] on lines that observations [B, O] show."""
+        return places_of(self.robot, observations)
 
     def leading(self, observations: Array, line: Line | Lines, progress: Progress, before: IndexArray) -> IndexArray:
         """Return which side leads now [B].
@@ -88,7 +88,8 @@ class RobotView:
         ahead = line.ahead(self.places(observations), progress.pointers, self.distances)
         c, s = np.cos(headings)[:, None], np.sin(headings)[:, None]
         x, y = ahead[..., 0], ahead[..., 1]
-        own = np.stack([c * x + s * y, c * y - s * x], axis=2).reshape(len(observations), -1)
+        turned = np.stack([c * x + s * y, c * y - s * x], axis=2)
+        own = np.concatenate([turned, ahead[..., 2:]], axis=2).reshape(len(observations), -1)
         stalled = np.minimum(progress.stalled / self.patience, 1.0)[:, None]
         inputs: Array = np.clip(np.concatenate([self.normaliser(body), own, stalled], axis=1), -LARGEST, LARGEST)
         return inputs

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from pbcs_ompl.core.seeding import SeedTree
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.resettable.attributes import EnvAttributes
 from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.robots.branches import random_branches
 from pbcs_ompl.skills.robots.free_space import WIDE, FreeSpace
 from pbcs_ompl.skills.robots.lines import Lines
 from pbcs_ompl.skills.robots.settings import RobotLineSettings, RobotStartSettings
@@ -105,13 +107,15 @@ class Worlds:
                                 "environments that differ in their walls only")
         training: list[tuple[int, Line, IndexArray]] = []
         tests: list[tuple[int, Line, IndexArray]] = []
+        robot = robot_of(models[0])
         for number, model in enumerate(models):
             space, rng = free_space(model, settings.clearance), seeds.child(f"lines {number}").generator()
+            draw = space.random_lines if robot.turning == 0.0 else partial(random_branches, model, robot)
             for kind, count in ((training, settings.lines_per_world), (tests, settings.tests_per_world)):
-                drawn = space.random_lines(count, rng, longest=settings.longest, spacing=settings.spacing)
-                kind += [(number, line, wide_pointers(space, line.points)) for line in drawn]
+                drawn = draw(count, rng, longest=settings.longest, spacing=settings.spacing)
+                kind += [(number, line, wide_pointers(space, line.points[:, :2])) for line in drawn]
         numbers, lines, wide = zip(*training, *tests, strict=True)
-        return cls(tuple(models), robot_of(models[0]), Lines.of(lines), np.array(numbers), len(training), wide)
+        return cls(tuple(models), robot, Lines.of(lines), np.array(numbers), len(training), wide)
 
     def step(self, rows: IndexArray, states: Array, controls: Array) -> WorldStep:
         """Make one step of executions on lines.

@@ -255,7 +255,7 @@ def test_wrong_input_is_named(trained: FollowerResult) -> None:
         evaluate_follower(trained.follower)
     with pytest.raises(InvalidOption, match="3 entries; expected the 2"):
         trained.follower.controller(Line(np.zeros((2, 2)), 0.1), entries=[0, 1, 2])
-    with pytest.raises(InvalidOption, match="in its plane"):
+    with pytest.raises(InvalidOption, match="3 dimensions; expected 2"):
         trained.follower.controller(Line(np.zeros((2, 3)), 0.1))
 
 
