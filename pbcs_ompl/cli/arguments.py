@@ -152,8 +152,8 @@ def _plan(verb: Parser) -> None:
     _add_improve(verb)
     verb.add_argument("--video", metavar="FILE", help="film the path that was found; .mp4 or .gif")
     verb.add_argument("--follow", metavar="FOLLOWER",
-                      help="let a robot's follower (a folder of pbcs train, or ant, ant-d4rl, quadrotor) drive along "
-                           "it, smoothed")
+                      help="let a robot's follower (a folder of pbcs train, or ant, ant-d4rl, car, quadrotor) drive "
+                           "along it, smoothed but for a car")
     verb.add_argument("--episodes", type=integer(1), metavar="N", help="of --follow: number of executions (30)")
     verb.add_argument("--epsilon", type=fraction, metavar="X", help="of --follow: fraction of random actions (0)")
     _add_out(verb)
@@ -192,8 +192,8 @@ def _train(verb: Parser) -> None:
 
 def _eval(verb: Parser) -> None:
     """run a trained controller many times from the start"""
-    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train; or ant, ant-d4rl, quadrotor: these come with "
-                                                 "pbcs")
+    verb.add_argument("dir", metavar="DIR", help="a folder of pbcs train; or ant, ant-d4rl, car, quadrotor: these come "
+                                                 "with pbcs")
     verb.add_argument("--path", metavar="DIR", help="of a follower: the plan to drive along, a folder of pbcs plan")
     verb.add_argument("--env", metavar="ID", help="of a follower, without --path: drive the shortest way to the goal")
     verb.add_argument("--env-kwargs", type=json_object, default={}, metavar="JSON",

@@ -64,8 +64,8 @@ class EnvAttributes:
     walls: Array | None = _optional("none", "rectangles [W, 4] (x0, y0, x1, y1), for pictures")
     goal_circle: tuple[float, float, float] | None = _optional("none", "centre and radius (x, y, r), for pictures")
     robot: Robot | None = _optional(
-        "none", "what moves in the plane with which the feature begins: heading, symmetries, falls, a "
-                "`pbcs_ompl.core.robot.Robot`")
+        "none", "what moves in the plane with which the feature begins: heading, symmetries, falls, whether the "
+                "heading counts on lines (`turning`), a `pbcs_ompl.core.robot.Robot`")
 
     def __post_init__(self) -> None:
         for name in FUNCTIONS:

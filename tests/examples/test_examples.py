@@ -21,6 +21,7 @@ EXAMPLES = {
     "ddpg_huber.py": ([], "solved: "),
     "robot_videos.py": (["quadrotor"], "runs/quadrotor.gif"),
     "train_ant_follower.py": (["run", "17000"], "of the test lines after"),
+    "train_car_follower.py": (["run", "30000"], "of the test lines after"),
     "train_quadrotor_follower.py": (["run", "30000"], "of the test lines after"),
 }
 

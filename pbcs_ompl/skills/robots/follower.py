@@ -149,7 +149,7 @@ class RobotFollower:
     @classmethod
     @checked
     def shipped(cls, name: str) -> "RobotFollower":
-        """Return a follower that comes with the package: "ant" (Gymnasium's), "ant-d4rl", "quadrotor"; see `examples`.
+        """Return a follower that comes with the package: "ant" (Gymnasium's), "ant-d4rl", "car" or "quadrotor".
 
         Raises:
             UnknownName: no such follower; the message suggests the closest one.

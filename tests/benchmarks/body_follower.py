@@ -1,11 +1,12 @@
-"""How well does the quadrotor's follower fly plans among obstacles that it never saw? Executions by the judge.
+"""How well does a follower of the car or of the quadrotor drive plans among obstacles that it never saw? By the judge.
 
-    python tests/benchmarks/quadrotor_follower.py [FOLLOWER] [--worlds 40] [--seed 1000]
+    python tests/benchmarks/body_follower.py car|quadrotor [--follower FOLDER] [--worlds 40] [--seed 1000]
 
-World k has the obstacles that `examples/train_quadrotor_follower.py` draws, from seed + k, a random start and a random
-goal at least 2.5 m apart. Lines: the plan of Rides itself, smoothed (as `pbcs plan --follow` does it), that of Ex, and
-the shortest way, which needs no planner. The start is always the same, so there is one execution without noise, and ten
-with 10 % random actions, for each line.
+World k has obstacles as `examples/train_*_follower.py` draws them, from seed + k, a random start and a random goal.
+Lines: the plans of Rides and of Ex, improved for a tenth of the search's transitions; for the car that of RidesSST with
+twice the transitions; for the quadrotor also smoothed, as `pbcs plan --follow` does it, and the shortest way, which
+needs no planner. The start is always the same, so there is one execution without noise, and ten with 10 % random
+actions, for each line.
 """
 
 import argparse
@@ -15,6 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 
 import pbcs_ompl
@@ -25,13 +27,15 @@ from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.robots.evaluation import drive, planned_line, shortest_line, smoothed_line
 from pbcs_ompl.skills.robots.follower import RobotFollower
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "train_quadrotor_follower.py"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 APART, BUDGET, EPISODES = 2.5, 300_000, 10
+PLANNERS = {"car": {"Rides": "10%", "RidesSST": "100%", "Ex": "10%"}, "quadrotor": {"Rides": "10%", "Ex": "10%"}}
+"""What plans, and what it may use beside the search."""
 
 
-def example() -> Any:
-    """Return the module of the example."""
-    spec = importlib.util.spec_from_file_location("train_quadrotor_follower", EXAMPLE)
+def example(robot: str) -> Any:
+    """Return the module of an example."""
+    spec = importlib.util.spec_from_file_location(robot, EXAMPLES / f"train_{robot}_follower.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -39,27 +43,38 @@ def example() -> Any:
     return module
 
 
-def model_of(seed: int) -> ResettableModel:
-    """Return the first environment that the seed leads to, with start and goal in free places."""
-    rng, drawn = np.random.default_rng(seed), example()
+def car_task(drawn: Any, rng: np.random.Generator) -> dict[str, Any]:
+    """Return the options of a random environment."""
+    options: dict[str, Any] = drawn.world(rng)
+    return options
+
+
+def quadrotor_task(drawn: Any, rng: np.random.Generator) -> dict[str, Any]:
+    """Return the options of a random environment, with start and goal in free places that are apart."""
     while True:
         start, goal = rng.uniform(0.5, drawn.EXTENT - 0.5, (2, 2)).round(3)
-        kwargs = {"obstacles": drawn.obstacles(rng), "start": [*start.tolist(), 0.0], "goal": goal.tolist()}
+        options = {"obstacles": drawn.obstacles(rng), "start": [*start.tolist(), 0.0], "goal": goal.tolist()}
         if np.linalg.norm(goal - start) < APART:
             continue
         try:
-            return pbcs_ompl.make(drawn.ENV, kwargs)
+            gymnasium.make(drawn.ENV, **options)
         except InvalidState:
             continue
+        return options
 
 
-def lines(follower: RobotFollower, model: ResettableModel, seed: int) -> Iterator[tuple[str, Line | None]]:
-    """Yield each way to the goal with its line; None where there is none that keeps clear of walls."""
-    plans = {name: pbcs_ompl.plan(model, name, seed=seed, max_transitions=BUDGET, improve="10%").trajectory
-             for name in ("Rides", "Ex")}
+TASKS = {"car": car_task, "quadrotor": quadrotor_task}
+
+
+def lines(follower: RobotFollower, model: ResettableModel, planners: dict[str, str],
+          seed: int) -> Iterator[tuple[str, Line | None]]:
+    """Yield each way to the goal with its line; None where there is none, or none that keeps clear of walls."""
+    plans = {name: pbcs_ompl.plan(model, name, seed=seed, max_transitions=BUDGET, improve=more).trajectory
+             for name, more in planners.items()}
     for name, plan in plans.items():
-        if plan is not None:
-            yield f"plan of {name}", planned_line(follower, model, plan)
+        yield f"plan of {name}", None if plan is None else planned_line(follower, model, plan)
+    if follower.view.robot.turning > 0.0:
+        return
     for name, make_line in (("smoothed", lambda: smoothed_line(follower, model, plans["Rides"])),
                             ("shortest", lambda: shortest_line(follower, model))):
         try:
@@ -81,17 +96,19 @@ def interval(successes: list[int], episodes: int) -> list[float]:
 def main() -> None:
     """Print a line of JSON for each kind of line and noise."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("follower", nargs="?", default="quadrotor")
+    parser.add_argument("robot", choices=sorted(TASKS))
+    parser.add_argument("--follower", type=Path)
     parser.add_argument("--worlds", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1000)
     given = parser.parse_args()
-    follower = (RobotFollower.load(given.follower) if Path(given.follower).is_dir()
-                else RobotFollower.shipped(given.follower))
+    follower = (RobotFollower.load(given.follower) if given.follower is not None
+                else RobotFollower.shipped(given.robot))
+    drawn = example(given.robot)
     found: dict[tuple[str, float], list[int]] = {}
     without: dict[str, int] = {}
     for seed in range(given.seed, given.seed + given.worlds):
-        model = model_of(seed)
-        for kind, line in lines(follower, model, seed):
+        model = pbcs_ompl.make(drawn.ENV, TASKS[given.robot](drawn, np.random.default_rng(seed)))
+        for kind, line in lines(follower, model, PLANNERS[given.robot], seed):
             if line is None:
                 without[kind] = without.get(kind, 0) + 1
                 continue
