@@ -98,14 +98,19 @@ class Controller:
             self.memory[name][episodes] = first
 
     def follow(self, corners: Any) -> None:
-        """Let a robot follow the line through some corners [N, 2] from now on, and begin again at its start.
+        """Let a robot follow the line through some corners [N, F] from now on, and begin again at its start.
+
+        Args:
+            corners: Places (x, y); of a robot whose heading counts on lines (x, y, turning heading), where headings
+                count on after whole turns.
 
         Raises:
-            ValueError: this is no robot's follower, or the corners are no line in the plane.
+            ValueError: this is no robot's follower, or the corners are no such line.
         """
         if not isinstance(self._kind, _RobotFollower):
             raise ValueError("only a robot's follower drives along any line; this controller has a task of its own")
-        self._kind.line = _line_through(np.asarray(corners, dtype=np.float64), self.words["spacing"])
+        size = self._kind.line.shape[1]
+        self._kind.line = _line_through(np.asarray(corners, dtype=np.float64), size, self.words["spacing"])
         self.restart(slice(None))
 
     def act(self, observation: Any) -> NDArray[Any]:
@@ -291,7 +296,9 @@ class _RobotFollower(_Follower):
         sides, self._actions, self._waves = arrays["side_observations"], arrays["side_actions"], arrays["waves"]
         self._shape, self._all_sides = sides.shape[:2], np.concatenate(list(sides)).T.copy()
         self._distances = np.append(self._distances, arrays["half"])  # where the leading side looks
-        self._frame, self._body = FreeJoint(words["speeds"]), np.delete(np.arange(self._shape[1]), self._entries)
+        self._frame = FreeJoint(words["speeds"]) if "level" not in arrays else Level(arrays["level"])
+        self._body = np.delete(np.arange(self._shape[1]), self._entries[:2])
+        self.line = arrays.get("line", np.empty((0, len(self._entries))))
 
     def step(self, observations: Array, memory: Memory) -> Step:
         """Return what the network sees [B, I], and that it acts [B].
@@ -301,14 +308,18 @@ class _RobotFollower(_Follower):
         """
         if not len(self.line):
             raise ValueError("there is no line to drive along; call follow(corners) first")
-        places, side, rows = observations.take(self._entries, axis=1), memory["side"], np.arange(len(observations))
-        self._advance(places, memory)
+        places = observations.take(self._entries, axis=1) / self._unit
+        side, rows = memory["side"], np.arange(len(observations))
+        near = self._advance(places, memory)
         all_seen = (observations @ self._all_sides).reshape(len(rows), *self._shape)
         headings = self._frame.heading(all_seen)
-        ahead = _complex(self._ahead(places, memory["pointer"], self._distances))
+        relative = self._ahead(near, memory["pointer"], self._distances)
+        ahead = _complex(np.ascontiguousarray(relative[..., :2]))
         side[:] = self._leading(headings, ahead[:, -1], side)
         turn = headings[rows, side].conj()
         own = (ahead[:, :-1] * turn[:, None]).view(np.float64)
+        if relative.shape[2] > 2:
+            own = np.concatenate([own.reshape(len(rows), -1, 2), relative[:, :-1, 2:]], axis=2).reshape(len(rows), -1)
         body = (self._frame.turned(all_seen[rows, side], turn).take(self._body, axis=1) - self._origin) / self._scale
         inputs = np.concatenate([body, own, np.minimum(memory["stalled"][:, None] / self._patience, 1.0)], axis=1)
         return np.minimum(np.maximum(inputs, -LARGEST), LARGEST), np.zeros(len(rows), np.int64)
@@ -375,6 +386,32 @@ class FreeJoint:
         return turned
 
 
+class Level:
+    """The frame of a robot that turns in the plane, and whose heading is an entry of the observation.
+
+    Args:
+        level: An observation in which it looks along the x axis [O], with NaN where the heading does not show. Its
+            first 0 is the heading.
+    """
+
+    def __init__(self, level: Array):
+        self._level, self._shown = level, np.isfinite(level)
+        self._angle = int(np.flatnonzero(level == 0.0)[0])
+
+    def heading(self, seen: Array) -> Complex:
+        """Return the directions [...] in which robots look, for observations [..., O]."""
+        directions: Complex = np.exp(1j * seen[..., self._angle])
+        return directions
+
+    def fallen(self, seen: Array) -> NDArray[np.bool_]:
+        """Return that none has fallen [B]."""
+        return np.zeros(len(seen), np.bool_)
+
+    def turned(self, seen: Array, turn: Complex) -> Array:
+        """Return observations [B, O] in a world that is turned so that robots look along the x axis; without place."""
+        return np.where(self._shown, self._level, seen)
+
+
 def _complex(vectors: Array) -> Complex:
     """Return pairs of numbers [..., 2 K] as complex ones [..., K]; [...] where K is 1."""
     numbers: Complex = vectors.view(np.complex128)
@@ -388,10 +425,10 @@ def _unit(vectors: Complex) -> Complex:
     return np.where(none, 1.0, vectors / np.where(none, 1.0, lengths)) if none.any() else vectors / lengths
 
 
-def _line_through(corners: Array, spacing: float) -> Array:
-    """Return the points [P, 2] of the line through corners [N, 2], about `spacing` apart along it."""
-    if corners.ndim != 2 or corners.shape[1] != 2 or not len(corners) or not np.isfinite(corners).all():
-        raise ValueError(f"corners of the shape {corners.shape}; expected finite ones [N, 2], N at least 1")
+def _line_through(corners: Array, size: int, spacing: float) -> Array:
+    """Return the points [P, F] of the line through corners [N, F], F = size, about `spacing` apart along it."""
+    if corners.ndim != 2 or corners.shape[1] != size or not len(corners) or not np.isfinite(corners).all():
+        raise ValueError(f"corners of the shape {corners.shape}; expected finite ones [N, {size}], N at least 1")
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     if lengths[-1] == 0.0:
         return corners[:1].copy()

@@ -19,6 +19,7 @@ from pbcs_ompl.skills.path_following.chain import FollowChain
 from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.path_following.shown_feature import NO_SINE
 from pbcs_ompl.skills.robots.follower import LOST_AFTER, RobotFollower
+from pbcs_ompl.skills.robots.places import periods
 from pbcs_ompl.skills.robots.shaking import waves
 
 PROBES = 16
@@ -98,9 +99,13 @@ def _robot(follower: RobotFollower, line: Line | None) -> ControllerData:
               "waves": waves(follower.policy.action_low, follower.policy.action_high)}
     if line is not None:
         arrays["line"] = line.points
+    turns = periods(robot)
+    if turns is not None:
+        arrays |= _level(robot, size) | {"unit": np.array([1.0, 1.0, 1.0 / robot.turning]), "periods": turns}
+        arrays["entries"] = np.array([*robot.place, int(np.flatnonzero(arrays["level"] == 0.0)[0])])
     words = {"kind": "robot follower", "memory": {"pointer": 0, "stalled": -1, "side": -1}, "patience": view.patience,
              "lost_after": LOST_AFTER, "reach": _reach(view.window, follower.spacing), "spacing": follower.spacing,
-             "speeds": _first_speed(robot, size)}
+             "speeds": 0 if turns is not None else _first_speed(robot, size)}
     return _with_networks(words, arrays, [follower.policy], follower.environment, follower.actions, size)
 
 
@@ -156,6 +161,26 @@ def _first_speed(robot: Robot, size: int) -> int:
     raise InvalidOption(f"{type(robot).__name__} cannot leave the toolkit: its heading and turns are not those of a "
                         "robot without heading, nor of one whose observation begins with place and quaternion of a "
                         "free joint")
+
+
+def _level(robot: Robot, size: int) -> dict[str, np.ndarray]:
+    """Return what `deploy.Level` needs, of a robot whose heading counts on lines; recognised as in `_first_speed`.
+
+    Raises:
+        InvalidOption: its heading is no entry of the observation, or turns change more than entries that show it.
+    """
+    rng = np.random.default_rng(0)
+    seen = rng.normal(size=(PROBES, size))
+    headings = robot.heading(seen)
+    turned = robot.turned(seen, -headings)
+    level = np.where(np.ptp(turned, axis=0) < 1e-9, turned[0], np.nan)
+    kept = np.setdiff1d(np.flatnonzero(np.isnan(level)), robot.place)
+    angle = np.flatnonzero(level == 0.0)
+    if (not len(angle) or not np.array_equal(seen[:, angle[0]], headings) or robot.fallen(seen).any()
+            or not np.array_equal(turned[:, kept], seen[:, kept]) or len(robot.symmetries) > 1):
+        raise InvalidOption(f"{type(robot).__name__} cannot leave the toolkit: its heading counts on lines, but is no "
+                            "entry of the observation, or shows in entries that turn in another way")
+    return {"level": level}
 
 
 def _is_free_joint(robot: Robot, seen: Array, angles: Array, first: int) -> bool:

@@ -49,7 +49,7 @@ def onnx_model(data: ControllerData) -> Any:
     seen = graph.input("observation", (BATCH, size), np.float64)
     memory = {name: graph.input(name, (BATCH,), np.int64) for name in words["memory"]}
     if words["kind"] == "robot follower":
-        line = graph.input("line", ("points", 2), np.float64)
+        line = graph.input("line", ("points", len(arrays["entries"])), np.float64)
     else:
         line = graph.constant(arrays["line"]) if "line" in arrays else ""
     steps = {"chain": _chain, "follower": _follower, "robot follower": _robot}
@@ -260,20 +260,22 @@ def _share(graph: Graph, data: ControllerData, stalled: str) -> str:
 
 def _robot(graph: Graph, data: ControllerData, seen: str, memory: dict[str, str], line: str) -> Step:
     words, arrays = data
-    places = graph.columns(seen, arrays["entries"])
+    places = graph("Div", graph.columns(seen, arrays["entries"]), arrays["unit"])
     found = _found_again(graph, data, places, memory, line)
-    pointer, stalled = _advanced(graph, data, places, found, line)
+    pointer, stalled = _advanced(graph, data, _unwound(graph, data, places, found["pointer"], line), found, line)
+    places = _unwound(graph, data, places, pointer, line)
     side = _leading(graph, data, seen, graph("Squeeze", _ahead(graph, line, places, pointer, arrays["half"]), [1]),
                     memory["side"])
     matrix = graph("Gather", arrays["side_observations"], side, axis=0)
     own = graph("Squeeze", graph("MatMul", matrix, graph("Unsqueeze", seen, [2])), [2])
-    c, s = _heading(graph, words["speeds"], own)
+    c, s = _heading(graph, data, own)
     ahead = _ahead(graph, line, places, pointer, arrays["distances"])
     x, y = graph.columns(ahead, [0]), graph.columns(ahead, [1])
     forward, left = _rotated(graph, x, y, graph("Unsqueeze", c, [1]), graph("Neg", graph("Unsqueeze", s, [1])))
-    view = graph("Flatten", graph("Concat", forward, left, axis=-1))
-    kept = np.delete(np.arange(len(words["observation"])), arrays["entries"])
-    body = graph("Concat", *_turned(graph, words["speeds"], own, kept, c, graph("Neg", s)), axis=-1)
+    turned = [graph.columns(ahead, [2])] if len(arrays["entries"]) > 2 else []
+    view = graph("Flatten", graph("Concat", forward, left, *turned, axis=-1))
+    kept = np.delete(np.arange(len(words["observation"])), arrays["entries"][:2])
+    body = graph("Concat", *_turned(graph, data, own, kept, c, graph("Neg", s)), axis=-1)
     normal = graph("Div", graph("Sub", body, arrays["origin"]), arrays["scale"])
     inputs = graph("Concat", normal, view, _share(graph, data, stalled), axis=-1)
     bounded = graph("Min", graph("Max", inputs, -deploy.LARGEST), deploy.LARGEST)
@@ -299,7 +301,7 @@ def _leading(graph: Graph, data: ControllerData, seen: str, far: str, before: st
     x, y = _unit(graph, graph.columns(far, [0]), graph.columns(far, [1]))
     cosines = []
     for one in sides:
-        c, s = _heading(graph, data.words["speeds"], graph("MatMul", seen, one.T))
+        c, s = _heading(graph, data, graph("MatMul", seen, one.T))
         cosines.append(graph("Add", graph("Mul", c, x), graph("Mul", s, y)))
     along = graph("Concat", *cosines, axis=-1)
     known = graph("Unsqueeze", graph("Max", before, 0), [1])
@@ -309,9 +311,12 @@ def _leading(graph: Graph, data: ControllerData, seen: str, far: str, before: st
     return graph("Squeeze", graph("Where", kept, graph("Unsqueeze", before, [1]), best), [1])
 
 
-def _heading(graph: Graph, speeds: int, seen: str) -> tuple[str, str]:
-    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.FreeJoint`."""
-    if not speeds:
+def _heading(graph: Graph, data: ControllerData, seen: str) -> tuple[str, str]:
+    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.FreeJoint` and `deploy.Level`."""
+    if "level" in data.arrays:
+        angle = graph.columns(seen, data.arrays["entries"][2:])
+        return graph("Cos", angle), graph("Sin", angle)
+    if not data.words["speeds"]:
         zero = graph("Mul", graph.columns(seen, [0]), 0.0)
         return graph("Add", zero, 1.0), zero
     w, x, y, z = (graph.columns(seen, [entry]) for entry in range(3, 7))
@@ -333,8 +338,12 @@ def _rotated(graph: Graph, x: str, y: str, c: str, s: str) -> tuple[str, str]:
     return (graph("Sub", graph("Mul", c, x), graph("Mul", s, y)), graph("Add", graph("Mul", s, x), graph("Mul", c, y)))
 
 
-def _turned(graph: Graph, speeds: int, seen: str, kept: Any, c: str, s: str) -> list[str]:
+def _turned(graph: Graph, data: ControllerData, seen: str, kept: Any, c: str, s: str) -> list[str]:
     """Return some entries of observations in a turned world, each [B, 1]; see `deploy.FreeJoint.turned`."""
+    speeds, level = data.words["speeds"], data.arrays.get("level")
+    if level is not None:
+        shown = np.isfinite(level[kept])
+        return [graph("Where", shown, np.where(shown, level[kept], 0.0), graph.columns(seen, kept))]
     if not speeds:
         return [graph.columns(seen, kept)]
     larger = graph("Sqrt", graph("Div", graph("Add", graph("Abs", c), 1.0), 2.0))

@@ -6,6 +6,7 @@ import numpy as np
 
 from pbcs_ompl.agents.policy import Policy
 from pbcs_ompl.core.env_spec import EnvSpec
+from pbcs_ompl.envs.car_robot import CarRobot, wrapped
 from pbcs_ompl.envs.point_robot import PointRobot
 from pbcs_ompl.resettable.actions import ActionMap
 from pbcs_ompl.skills.activation_sets import Ball, EnvironmentGoal
@@ -17,6 +18,7 @@ from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.path_following.shown_feature import NO_SINE, ShownFeature
 from pbcs_ompl.skills.policy import ObservationTransform, SkillPolicy
 from pbcs_ompl.skills.robots.follower import LOST_AFTER, RobotFollower
+from pbcs_ompl.skills.robots.places import periods
 from pbcs_ompl.skills.robots.view import RobotView
 
 MAZE = EnvSpec("pbcs/Maze-v0", {"size": 2})
@@ -104,11 +106,26 @@ def ant_follower() -> Case:
     return Case(follower, walks, line)
 
 
+def car_follower() -> Case:
+    """Its heading counts on the line, which turns further than a whole turn."""
+    rng = np.random.default_rng(5)
+    robot = CarRobot(turning=0.9)
+    view = RobotView(robot, ObservationTransform(rng.normal(size=4), rng.uniform(0.5, 2.0, 4)),
+                     np.array([0.2, 0.6, 1.5]), 0.5, 15)
+    line = Line.through(np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 4.0], [1.0, 1.5, 9.0]]), 0.05, periods=periods(robot))
+    x, y, turned = np.moveaxis(line.points[::8][:20, None] + rng.normal(scale=0.1, size=(20, 50, 3)), 2, 0)
+    heading, speed = wrapped(turned / robot.turning), rng.uniform(-1.0, 2.0, (20, 50))
+    walks = np.stack([x, y, heading, speed, np.cos(heading), np.sin(heading)], axis=2)
+    follower = RobotFollower(network(rng, view.size), view, MAZE, ActionMap(np.full(2, -0.1), np.full(2, 0.1), (2,)),
+                             0.05, 0.2, {})
+    return Case(follower, walks, line)
+
+
 FLOAT64 = ActionMap(np.full(2, -0.1), np.full(2, 0.1), (2,))
 CASES = {"chain": lambda: chain(FLOAT64), "chain of normalised layers": lambda: chain(FLOAT64, normed=True),
          "chain of integers": lambda: chain(ActionMap(np.array([-1, -2]), np.array([1, 3]), (2,))),
          "follow chain": follow_chain, "turning chain": turning_chain,
-         "point follower": point_follower, "ant": ant_follower}
+         "point follower": point_follower, "car": car_follower, "ant": ant_follower}
 
 
 def actions_of(case: Case) -> np.ndarray:

@@ -2,13 +2,17 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pbcs_ompl.core.errors import InvalidOption
+from pbcs_ompl.envs.car_robot import CarRobot
 from pbcs_ompl.results.export.controller_data import controller_data
 from pbcs_ompl.results.export.numpy_controller import write_numpy
+from pbcs_ompl.skills.robots.follower import RobotFollower
 from tests.results.export.controllers import CASES, actions_of
 
 ALONE = """
@@ -49,3 +53,20 @@ def test_it_does_the_same_with_numpy_alone(kind: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(found["together"], expected, rtol=0, atol=1e-6)
     np.testing.assert_allclose(found["alone"], expected[:, 0], rtol=0, atol=1e-6)
     assert len(np.unique(np.round(expected, 6), axis=0)) > 1
+
+
+class Sliding(CarRobot):
+    """One of its entries is a speed in the world, which turns with it."""
+
+    def turned(self, observations: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        turned = super().turned(observations, angles)
+        turned[:, 3] *= np.cos(angles)
+        return turned
+
+
+def test_a_robot_that_turns_in_another_way_is_refused() -> None:
+    case = CASES["car"]()
+    assert isinstance(case.controller, RobotFollower)
+    view = replace(case.controller.view, robot=Sliding(turning=0.9))
+    with pytest.raises(InvalidOption, match="shows in entries that turn in another way"):
+        controller_data(replace(case.controller, view=view), case.line)
