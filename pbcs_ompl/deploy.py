@@ -297,6 +297,7 @@ class _RobotFollower(_Follower):
         self._shape, self._all_sides = sides.shape[:2], np.concatenate(list(sides)).T.copy()
         self._distances = np.append(self._distances, arrays["half"])  # where the leading side looks
         self._frame = FreeJoint(words["speeds"]) if "level" not in arrays else Level(arrays["level"])
+        self._burst = words.get("burst", 0)  # steps for which a car that is stuck swings
         self._body = np.delete(np.arange(self._shape[1]), self._entries[:2])
         self.line = arrays.get("line", np.empty((0, len(self._entries))))
 
@@ -325,10 +326,14 @@ class _RobotFollower(_Follower):
         return np.minimum(np.maximum(inputs, -LARGEST), LARGEST), np.zeros(len(rows), np.int64)
 
     def controls(self, controls: Array, observations: Array, memory: Memory) -> Array:
-        """Return the controls [B, A] of the robot for those of the side that leads; one that has fallen shakes."""
+        """Return the controls [B, A] of the robot for those of the side that leads; fallen and stuck ones shake."""
         turned = (controls[:, None] @ self._actions[memory["side"]])[:, 0]
-        if (fallen := self._frame.fallen(observations)).any():
-            turned[fallen] = self._waves[memory["stalled"][fallen] % len(self._waves)]
+        swinging = self._frame.fallen(observations)
+        if self._burst:
+            over = memory["stalled"] - self._patience
+            swinging |= (over >= 0) & (over // self._burst % 2 == 0)
+        if swinging.any():
+            turned[swinging] = self._waves[memory["stalled"][swinging] % len(self._waves)]
         return turned
 
     def _leading(self, headings: Complex, ahead: Complex, before: Indices) -> Indices:

@@ -20,7 +20,7 @@ from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.path_following.shown_feature import NO_SINE
 from pbcs_ompl.skills.robots.follower import LOST_AFTER, RobotFollower
 from pbcs_ompl.skills.robots.places import periods
-from pbcs_ompl.skills.robots.shaking import waves
+from pbcs_ompl.skills.robots.shaking import BURST, waves
 
 PROBES = 16
 """Observations by which a robot's own frame is recognised."""
@@ -105,7 +105,8 @@ def _robot(follower: RobotFollower, line: Line | None) -> ControllerData:
         arrays["entries"] = np.array([*robot.place, int(np.flatnonzero(arrays["level"] == 0.0)[0])])
     words = {"kind": "robot follower", "memory": {"pointer": 0, "stalled": -1, "side": -1}, "patience": view.patience,
              "lost_after": LOST_AFTER, "reach": _reach(view.window, follower.spacing), "spacing": follower.spacing,
-             "speeds": 0 if turns is not None else _first_speed(robot, size)}
+             "speeds": 0 if turns is not None else _first_speed(robot, size),
+             "burst": 0 if turns is None else BURST}
     return _with_networks(words, arrays, [follower.policy], follower.environment, follower.actions, size)
 
 

@@ -283,14 +283,19 @@ def _robot(graph: Graph, data: ControllerData, seen: str, memory: dict[str, str]
 
 
 def _shaken(graph: Graph, data: ControllerData, seen: str, controls: str, stalled: str) -> str:
-    """Return controls [B, A], in which robots that have fallen shake."""
-    if not data.words["speeds"]:
+    """Return controls [B, A], in which robots that have fallen shake, and cars that are stuck."""
+    words, waves = data.words, data.arrays["waves"]
+    if words["burst"]:
+        over = graph("Sub", graph("Unsqueeze", stalled, [1]), words["patience"])
+        bursts = graph("Mod", graph("Div", over, words["burst"]), 2)
+        swinging = graph("And", graph("GreaterOrEqual", over, 0), graph("Equal", bursts, 0))
+    elif words["speeds"]:
+        quaternion = graph.columns(seen, range(3, 7))
+        lean = graph("MatMul", graph("Mul", quaternion, quaternion), deploy.LEAN[:, None])
+        swinging = graph("Less", lean, 0.0)
+    else:
         return controls
-    quaternion = graph.columns(seen, range(3, 7))
-    lean = graph("MatMul", graph("Mul", quaternion, quaternion), deploy.LEAN[:, None])
-    fallen = graph("Less", lean, 0.0)
-    waves = data.arrays["waves"]
-    return graph("Where", fallen, graph("Gather", waves, graph("Mod", stalled, len(waves)), axis=0), controls)
+    return graph("Where", swinging, graph("Gather", waves, graph("Mod", stalled, len(waves)), axis=0), controls)
 
 
 def _leading(graph: Graph, data: ControllerData, seen: str, far: str, before: str) -> str:

@@ -22,7 +22,7 @@ from pbcs_ompl.skills.path_following.follower import Progress
 from pbcs_ompl.skills.path_following.line import Line
 from pbcs_ompl.skills.policy import SkillPolicy, load_policies, save_policies
 from pbcs_ompl.skills.robots.places import dimensions, line_through
-from pbcs_ompl.skills.robots.shaking import CYCLE, waves
+from pbcs_ompl.skills.robots.shaking import CYCLE, stuck, waves
 from pbcs_ompl.skills.robots.view import RobotView
 from pbcs_ompl.skills.robots.worlds import robot_of
 from pbcs_ompl.skills.side_by_side import SideBySide
@@ -52,7 +52,8 @@ class FollowerWords(TypedDict):
 class RobotController(SideBySide):
     """Drives episodes along one line: a pointer for each of them moves forward on it, and back where one is lost.
 
-    The policy acts as long as the robot stands; one that has fallen shakes, see `pbcs_ompl.skills.robots.shaking`.
+    The policy acts as long as the robot stands; one that has fallen shakes, and so does a car that is stuck: see
+    `pbcs_ompl.skills.robots.shaking`.
 
     Attributes:
         progress: How far each episode has come [B].
@@ -83,8 +84,10 @@ class RobotController(SideBySide):
         self.progress.pointers[members], self.progress.stalled[members] = moved.pointers, moved.stalled
         self._sides[members] = sides
         controls = self._view.controls(self._policy.act(self._view.inputs(shown, self.line, moved, sides)), sides)
-        fallen = self._view.robot.fallen(shown)
-        controls[fallen] = self._waves[moved.stalled[fallen] % CYCLE]
+        swinging = self._view.robot.fallen(shown)
+        if self._view.robot.turning > 0.0:
+            swinging |= stuck(moved.stalled, self._view.patience)
+        controls[swinging] = self._waves[moved.stalled[swinging] % CYCLE]
         return self._actions.to_actions(controls)
 
 

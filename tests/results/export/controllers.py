@@ -111,11 +111,12 @@ def car_follower() -> Case:
     rng = np.random.default_rng(5)
     robot = CarRobot(turning=0.9)
     view = RobotView(robot, ObservationTransform(rng.normal(size=4), rng.uniform(0.5, 2.0, 4)),
-                     np.array([0.2, 0.6, 1.5]), 0.5, 15)
+                     np.array([0.2, 0.6, 1.5]), 0.5, 3)
     line = Line.through(np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 4.0], [1.0, 1.5, 9.0]]), 0.05, periods=periods(robot))
     x, y, turned = np.moveaxis(line.points[::8][:20, None] + rng.normal(scale=0.1, size=(20, 50, 3)), 2, 0)
     heading, speed = wrapped(turned / robot.turning), rng.uniform(-1.0, 2.0, (20, 50))
     walks = np.stack([x, y, heading, speed, np.cos(heading), np.sin(heading)], axis=2)
+    walks[10:] = walks[10]  # so long that it is stuck
     follower = RobotFollower(network(rng, view.size), view, MAZE, ActionMap(np.full(2, -0.1), np.full(2, 0.1), (2,)),
                              0.05, 0.2, {})
     return Case(follower, walks, line)

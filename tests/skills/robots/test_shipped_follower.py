@@ -79,6 +79,18 @@ def test_the_quadrotor_flies_a_plan_past_walls_that_it_never_saw(monkeypatch: py
     assert followers_of(model) == ["quadrotor"]
 
 
+def test_the_car_parks_along_plans_past_walls_that_it_never_saw() -> None:
+    """Both plans come from the planner that makes shorter ones; see docs/benchmarks.md for how often it parks."""
+    follower, options = RobotFollower.shipped("car"), {"obstacles": [[2.5, 0.0, 2.8, 4.5], [5.0, 3.5, 5.3, 8.0]]}
+    for goal in ((6.5, 6.0, 1.5), (1.2, 6.5, -2.0)):
+        model = pbcs_ompl.make("pbcs/CarPark-v0", options | {"start": [1.0, 1.5, 0.5], "goal": list(goal)})
+        trajectory = pbcs_ompl.plan(model, "RidesSST", improve="100%", seed=0).trajectory
+        assert trajectory is not None
+        found = evaluate_follower(follower, trajectory=trajectory, episodes=20, epsilon=0.1, seed=1)
+        assert found.successes >= 12, found
+    assert followers_of(model) == ["car"]
+
+
 def test_the_command_line_knows_it_by_name(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("mujoco")
     words = ["eval", "ant", "--env", "pbcs/AntMaze-v0", "--episodes", "2", "--json"]

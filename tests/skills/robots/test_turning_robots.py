@@ -13,6 +13,7 @@ from pbcs_ompl.skills.robots.evaluation import planned_line, shortest_line, smoo
 from pbcs_ompl.skills.robots.follower import RobotFollower
 from pbcs_ompl.skills.robots.lines import Lines
 from pbcs_ompl.skills.robots.places import line_through, periods, places_of
+from pbcs_ompl.skills.robots.shaking import BURST
 from pbcs_ompl.skills.robots.worlds import robot_of
 
 SMALL = {"lines_per_world": 6, "tests_per_world": 2, "longest": 5.0, "clearance": 0.2, "near": 0.2, "middle": 0.6,
@@ -88,3 +89,17 @@ def test_a_car_is_followed_along_plans_only(car: ResettableModel, follower: Robo
         evaluate_follower(follower, "pbcs/CarPark-v0")
     trajectory = pbcs_ompl.plan(car, seed=0).trajectory
     assert evaluate_follower(follower, trajectory=trajectory, episodes=2).episodes == 2
+
+
+def test_a_car_that_is_stuck_swings_and_drives_in_turns(car: ResettableModel, follower: RobotFollower) -> None:
+    """It does so after as many steps without progress as training allows; robots that can turn anywhere do not."""
+    trajectory = pbcs_ompl.plan(car, seed=0).trajectory
+    assert trajectory is not None
+    controller, patience = follower.controller(planned_line(follower, car, trajectory)), follower.view.patience
+    observation = car.observe(car.initial_state(0)[None])[0]
+    swung = []
+    for _ in range(patience + 4 * BURST):
+        control = controller.act(observation)
+        swung.append(bool((np.abs(control) == 1.0).all()))
+    expected = [*[False] * patience, *[True] * BURST, *[False] * BURST, *[True] * BURST, *[False] * BURST]
+    assert swung == expected
