@@ -31,7 +31,8 @@ def stuck(stalled: IndexArray, patience: int) -> BoolArray:
     For robots whose heading counts on lines: they cannot turn away from what they touch.
     """
     over = stalled - patience
-    return (over >= 0) & (over // BURST % 2 == 0)
+    swinging: BoolArray = (over >= 0) & (over // BURST % 2 == 0)
+    return swinging
 
 
 def waves(low: Array, high: Array) -> Array:
