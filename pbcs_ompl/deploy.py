@@ -30,19 +30,14 @@ Memory = dict[str, Indices]
 Step = tuple[Array, Indices]  # what networks see [B, I], and which of them acts [B]
 FORMAT = 1
 LAYER_NORM_EPSILON = 1e-5
-KEEP_SIDE = math.cos(math.pi / 3)
-"""A side leads as long as the cosine of the angle between the line and its heading is at least this."""
-QUATERNION = np.array([3, 6, 4, 5])
-"""Where an observation with a free joint has the w, z, x and y of the quaternion."""
+KEEP_SIDE = math.cos(math.pi / 3)  # a side leads while the cosine of the angle of line and heading is at least this
+QUATERNION = np.array([3, 6, 4, 5])  # where an observation with a free joint has the w, z, x and y of the quaternion
 LEAN = np.array([0.5, -1.5, -1.5, 0.5])  # times a squared quaternion: below 0 from 60 degrees on
 LARGEST = 10.0  # bound of the inputs of a robot's network
 
 
 def load(path: str | Path | None = None) -> "Controller":
-    """Return the controller in an npz file.
-
-    Args:
-        path: The file; None for the one beside this file that is called like it.
+    """Return the controller in an npz file; None for the one beside this file that is called like it.
 
     Raises:
         ValueError: the file holds no controller, or one of another version.
@@ -72,10 +67,6 @@ class Controller:
     Attributes:
         words: What the controller is: the task, the meaning of observations and actions, the limit of steps.
         memory: What it keeps between steps, by name; each an array [B].
-
-    Args:
-        words: See above.
-        arrays: Its numbers.
     """
 
     def __init__(self, words: Words, arrays: Arrays):
@@ -100,9 +91,7 @@ class Controller:
     def follow(self, corners: Any) -> None:
         """Let a robot follow the line through some corners [N, F] from now on, and begin again at its start.
 
-        Args:
-            corners: Places (x, y); of a robot whose heading counts on lines (x, y, turning heading), where headings
-                count on after whole turns.
+        They are (x, y), or (x, y, turning heading) where that counts; such headings count on after whole turns.
 
         Raises:
             ValueError: this is no robot's follower, or the corners are no such line.
@@ -217,24 +206,18 @@ class _Chain:
         """Return which parts of entries [B, N] observations [B, O] lie in: balls, then classifiers."""
         squares = (observations[:, None] - self._centers) ** 2
         inside: NDArray[np.bool_] = np.add.reduce(squares * self._weights, axis=2) <= self._squares
-        if not self._classifiers:
-            return inside
-        learnt = [_chance(observations, *numbers) >= confidence for *numbers, confidence in self._classifiers]
-        return np.concatenate([inside, np.stack(learnt, axis=1)], axis=1)
-
-
-def _chance(observations: Array, origin: Array, scale: Array, weights_1: Array, bias_1: Array, weights_2: Array,
-            bias_2: Array) -> Array:
-    """Return the output [B] of a classifier."""
-    hidden = np.tanh((observations - origin) / scale @ weights_1 + bias_1)
-    return 1.0 / (1.0 + np.exp(-(hidden @ weights_2 + bias_2)[:, 0]))
+        for origin, scale, weights_1, bias_1, weights_2, bias_2, confidence in self._classifiers:
+            hidden = np.tanh((observations - origin) / scale @ weights_1 + bias_1)
+            chance = 1.0 / (1.0 + np.exp(-(hidden @ weights_2 + bias_2)))
+            inside = np.concatenate([inside, chance >= confidence], axis=1)
+        return inside
 
 
 class _Follower:
     """Moves a pointer forward on a line, and sees where the line leads."""
 
     def __init__(self, words: Words, arrays: Arrays):
-        self.line: Array = arrays.get("line", np.empty((0, 2)))
+        self.line: Array = arrays.get("line", np.empty((0, len(arrays["unit"]))))
         self._distances, self._firsts, self._entries = arrays["distances"], arrays["firsts"], arrays["entries"]
         self._unit, self._origin, self._scale = arrays["unit"], arrays["origin"], arrays["scale"]
         self._patience, self._lost_after = words["patience"], words.get("lost_after") or np.inf
@@ -296,10 +279,9 @@ class _RobotFollower(_Follower):
         sides, self._actions, self._waves = arrays["side_observations"], arrays["side_actions"], arrays["waves"]
         self._shape, self._all_sides = sides.shape[:2], np.concatenate(list(sides)).T.copy()
         self._distances = np.append(self._distances, arrays["half"])  # where the leading side looks
-        self._frame = FreeJoint(words["speeds"]) if "level" not in arrays else Level(arrays["level"])
+        self._frame = FreeJoint(words["speeds"], words.get("angle", -1))
+        self._body = arrays.get("body", np.delete(np.arange(self._shape[1]), self._entries[:2]))
         self._burst = words.get("burst", 0)  # steps for which a car that is stuck swings
-        self._body = np.delete(np.arange(self._shape[1]), self._entries[:2])
-        self.line = arrays.get("line", np.empty((0, len(self._entries))))
 
     def step(self, observations: Array, memory: Memory) -> Step:
         """Return what the network sees [B, I], and that it acts [B].
@@ -318,9 +300,8 @@ class _RobotFollower(_Follower):
         ahead = _complex(np.ascontiguousarray(relative[..., :2]))
         side[:] = self._leading(headings, ahead[:, -1], side)
         turn = headings[rows, side].conj()
-        own = (ahead[:, :-1] * turn[:, None]).view(np.float64)
-        if relative.shape[2] > 2:
-            own = np.concatenate([own.reshape(len(rows), -1, 2), relative[:, :-1, 2:]], axis=2).reshape(len(rows), -1)
+        turned = (ahead[:, :-1, None] * turn[:, None, None]).view(np.float64)
+        own = np.concatenate([turned, relative[:, :-1, 2:]], axis=2).reshape(len(rows), -1)
         body = (self._frame.turned(all_seen[rows, side], turn).take(self._body, axis=1) - self._origin) / self._scale
         inputs = np.concatenate([body, own, np.minimum(memory["stalled"][:, None] / self._patience, 1.0)], axis=1)
         return np.minimum(np.maximum(inputs, -LARGEST), LARGEST), np.zeros(len(rows), np.int64)
@@ -358,16 +339,18 @@ class FreeJoint:
     points along the x axis of the joint, and a turn of the world by a multiplies both by exp(ia/2).
 
     Args:
-        speeds: The entry where its speed begins; 0 for a robot that has no heading.
+        speeds: The entry where its speed begins; 0 for another robot.
+        angle: Of another robot, the entry that is its heading; -1 for one without.
     """
 
-    def __init__(self, speeds: int):
-        self._heads, self._moved = speeds > 0, np.array([speeds, speeds + 1, *QUATERNION])
+    def __init__(self, speeds: int, angle: int = -1):
+        self._heads, self._moved, self._angle = speeds > 0, np.array([speeds, speeds + 1, *QUATERNION]), angle
 
     def heading(self, seen: Array) -> Complex:
         """Return the directions [...] in which the x axis of the joint points in observations [..., O]."""
         if not self._heads:
-            return np.ones(seen.shape[:-1], np.complex128)
+            angles = seen[..., self._angle] if self._angle >= 0 else np.zeros(seen.shape[:-1])
+            return np.asarray(np.exp(1j * angles))
         squares = np.square(_complex(seen.take(QUATERNION, axis=-1)))
         return _unit(squares[..., 0] + squares[..., 1])
 
@@ -389,32 +372,6 @@ class FreeJoint:
         turned = seen.copy()
         turned[:, self._moved] = moved.view(np.float64)
         return turned
-
-
-class Level:
-    """The frame of a robot that turns in the plane, and whose heading is an entry of the observation.
-
-    Args:
-        level: An observation in which it looks along the x axis [O], with NaN where the heading does not show. Its
-            first 0 is the heading.
-    """
-
-    def __init__(self, level: Array):
-        self._level, self._shown = level, np.isfinite(level)
-        self._angle = int(np.flatnonzero(level == 0.0)[0])
-
-    def heading(self, seen: Array) -> Complex:
-        """Return the directions [...] in which robots look, for observations [..., O]."""
-        directions: Complex = np.exp(1j * seen[..., self._angle])
-        return directions
-
-    def fallen(self, seen: Array) -> NDArray[np.bool_]:
-        """Return that none has fallen [B]."""
-        return np.zeros(len(seen), np.bool_)
-
-    def turned(self, seen: Array, turn: Complex) -> Array:
-        """Return observations [B, O] in a world that is turned so that robots look along the x axis; without place."""
-        return np.where(self._shown, self._level, seen)
 
 
 def _complex(vectors: Array) -> Complex:

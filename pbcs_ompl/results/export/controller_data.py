@@ -1,6 +1,7 @@
 """A trained controller as plain values and arrays: what `pbcs_ompl.deploy` and other formats compute with."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from pbcs_ompl.skills.path_following.shown_feature import NO_SINE
 from pbcs_ompl.skills.robots.follower import LOST_AFTER, RobotFollower
 from pbcs_ompl.skills.robots.places import periods
 from pbcs_ompl.skills.robots.shaking import BURST, waves
+from pbcs_ompl.skills.robots.view import LARGEST
 
 PROBES = 16
 """Observations by which a robot's own frame is recognised."""
@@ -99,15 +101,22 @@ def _robot(follower: RobotFollower, line: Line | None) -> ControllerData:
               "waves": waves(follower.policy.action_low, follower.policy.action_high)}
     if line is not None:
         arrays["line"] = line.points
-    turns = periods(robot)
+    policy, turns, angle = follower.policy, periods(robot), -1
     if turns is not None:
-        arrays |= _level(robot, size) | {"unit": np.array([1.0, 1.0, 1.0 / robot.turning]), "periods": turns}
-        arrays["entries"] = np.array([*robot.place, int(np.flatnonzero(arrays["level"] == 0.0)[0])])
+        level, normaliser = _level(robot, size), view.normaliser
+        angle = int(np.flatnonzero(level == 0.0)[0])
+        seen = np.delete(level, robot.place)
+        constants = np.clip((seen - normaliser.origin) / normaliser.scale, -LARGEST, LARGEST)
+        policy = _without(policy, np.pad(constants, (0, view.size - len(seen)), constant_values=np.nan))
+        arrays |= {"unit": np.array([1.0, 1.0, 1.0 / robot.turning]), "periods": turns,
+                   "entries": np.array([*robot.place, angle]), "origin": normaliser.origin[np.isnan(seen)],
+                   "scale": normaliser.scale[np.isnan(seen)],
+                   "body": np.setdiff1d(np.flatnonzero(np.isnan(level)), robot.place)}
     words = {"kind": "robot follower", "memory": {"pointer": 0, "stalled": -1, "side": -1}, "patience": view.patience,
              "lost_after": LOST_AFTER, "reach": _reach(view.window, follower.spacing), "spacing": follower.spacing,
              "speeds": 0 if turns is not None else _first_speed(robot, size),
-             "burst": 0 if turns is None else BURST}
-    return _with_networks(words, arrays, [follower.policy], follower.environment, follower.actions, size)
+             "angle": angle, "burst": 0 if turns is None else BURST}
+    return _with_networks(words, arrays, [policy], follower.environment, follower.actions, size)
 
 
 def _with_networks(words: dict[str, Any], arrays: dict[str, Any], policies: Sequence[Policy], environment: EnvSpec,
@@ -164,8 +173,18 @@ def _first_speed(robot: Robot, size: int) -> int:
                         "free joint")
 
 
-def _level(robot: Robot, size: int) -> dict[str, np.ndarray]:
-    """Return what `deploy.Level` needs, of a robot whose heading counts on lines; recognised as in `_first_speed`.
+def _without(policy: Policy, constants: Array) -> Policy:
+    """Return a policy without the inputs that are constant [I], NaN for one that is not: they are part of the bias."""
+    weight, bias, *norm = policy.layers[0]
+    fixed = np.isfinite(constants)
+    first = (weight[~fixed], (bias + constants[fixed] @ weight[fixed]).astype(np.float32), *norm)
+    return replace(policy, layers=(first, *policy.layers[1:]))
+
+
+def _level(robot: Robot, size: int) -> Array:
+    """Return an observation [O] of a robot that looks along the x axis, NaN where the heading does not show.
+
+    The robot is one whose heading counts on lines; its first 0 is the heading. It is recognised as in `_first_speed`.
 
     Raises:
         InvalidOption: its heading is no entry of the observation, or turns change more than entries that show it.
@@ -174,14 +193,14 @@ def _level(robot: Robot, size: int) -> dict[str, np.ndarray]:
     seen = rng.normal(size=(PROBES, size))
     headings = robot.heading(seen)
     turned = robot.turned(seen, -headings)
-    level = np.where(np.ptp(turned, axis=0) < 1e-9, turned[0], np.nan)
+    level: Array = np.where(np.ptp(turned, axis=0) < 1e-9, turned[0], np.nan)
     kept = np.setdiff1d(np.flatnonzero(np.isnan(level)), robot.place)
     angle = np.flatnonzero(level == 0.0)
     if (not len(angle) or not np.array_equal(seen[:, angle[0]], headings) or robot.fallen(seen).any()
             or not np.array_equal(turned[:, kept], seen[:, kept]) or len(robot.symmetries) > 1):
         raise InvalidOption(f"{type(robot).__name__} cannot leave the toolkit: its heading counts on lines, but is no "
                             "entry of the observation, or shows in entries that turn in another way")
-    return {"level": level}
+    return level
 
 
 def _is_free_joint(robot: Robot, seen: Array, angles: Array, first: int) -> bool:

@@ -274,7 +274,7 @@ def _robot(graph: Graph, data: ControllerData, seen: str, memory: dict[str, str]
     forward, left = _rotated(graph, x, y, graph("Unsqueeze", c, [1]), graph("Neg", graph("Unsqueeze", s, [1])))
     turned = [graph.columns(ahead, [2])] if len(arrays["entries"]) > 2 else []
     view = graph("Flatten", graph("Concat", forward, left, *turned, axis=-1))
-    kept = np.delete(np.arange(len(words["observation"])), arrays["entries"][:2])
+    kept = arrays.get("body", np.delete(np.arange(len(words["observation"])), arrays["entries"][:2]))
     body = graph("Concat", *_turned(graph, data, own, kept, c, graph("Neg", s)), axis=-1)
     normal = graph("Div", graph("Sub", body, arrays["origin"]), arrays["scale"])
     inputs = graph("Concat", normal, view, _share(graph, data, stalled), axis=-1)
@@ -317,9 +317,9 @@ def _leading(graph: Graph, data: ControllerData, seen: str, far: str, before: st
 
 
 def _heading(graph: Graph, data: ControllerData, seen: str) -> tuple[str, str]:
-    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.FreeJoint` and `deploy.Level`."""
-    if "level" in data.arrays:
-        angle = graph.columns(seen, data.arrays["entries"][2:])
+    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.FreeJoint`."""
+    if data.words["angle"] >= 0:
+        angle = graph.columns(seen, [data.words["angle"]])
         return graph("Cos", angle), graph("Sin", angle)
     if not data.words["speeds"]:
         zero = graph("Mul", graph.columns(seen, [0]), 0.0)
@@ -345,10 +345,7 @@ def _rotated(graph: Graph, x: str, y: str, c: str, s: str) -> tuple[str, str]:
 
 def _turned(graph: Graph, data: ControllerData, seen: str, kept: Any, c: str, s: str) -> list[str]:
     """Return some entries of observations in a turned world, each [B, 1]; see `deploy.FreeJoint.turned`."""
-    speeds, level = data.words["speeds"], data.arrays.get("level")
-    if level is not None:
-        shown = np.isfinite(level[kept])
-        return [graph("Where", shown, np.where(shown, level[kept], 0.0), graph.columns(seen, kept))]
+    speeds = data.words["speeds"]
     if not speeds:
         return [graph.columns(seen, kept)]
     larger = graph("Sqrt", graph("Div", graph("Add", graph("Abs", c), 1.0), 2.0))
