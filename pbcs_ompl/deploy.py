@@ -279,7 +279,7 @@ class _RobotFollower(_Follower):
         sides, self._actions, self._waves = arrays["side_observations"], arrays["side_actions"], arrays["waves"]
         self._shape, self._all_sides = sides.shape[:2], np.concatenate(list(sides)).T.copy()
         self._distances = np.append(self._distances, arrays["half"])  # where the leading side looks
-        self._frame = FreeJoint(words["speeds"], words.get("angle", -1))
+        self._frame = RobotFrame(words["speeds"], words.get("angle", -1))
         self._body = arrays.get("body", np.delete(np.arange(self._shape[1]), self._entries[:2]))
         self._burst = words.get("burst", 0)  # steps for which a car that is stuck swings
 
@@ -332,11 +332,12 @@ class _RobotFollower(_Follower):
         return before if kept.all() else np.where(kept, before, along.argmax(axis=1))
 
 
-class FreeJoint:
-    """The frame of a robot whose observation begins with place and quaternion (w, x, y, z) of a free joint.
+class RobotFrame:
+    """The frame of a robot: of a free joint, of a heading that is an entry of the observation, or of none.
 
-    Vectors in the plane are complex numbers. The quaternion is two of them, w + iz and x + iy: the sum of their squares
-    points along the x axis of the joint, and a turn of the world by a multiplies both by exp(ia/2).
+    Vectors in the plane are complex. With a free joint observations begin with place and quaternion (w, x, y, z), which
+    is two complex numbers, w + iz and x + iy: the sum of their squares points along the x axis of the joint, and a turn
+    of the world by a multiplies both by exp(ia/2).
 
     Args:
         speeds: The entry where its speed begins; 0 for another robot.

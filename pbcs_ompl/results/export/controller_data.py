@@ -204,7 +204,7 @@ def _level(robot: Robot, size: int) -> Array:
 
 
 def _is_free_joint(robot: Robot, seen: Array, angles: Array, first: int) -> bool:
-    kind = deploy.FreeJoint(first)
+    kind = deploy.RobotFrame(first)
     ours, theirs = (np.delete(rows, robot.place, axis=1) for rows in
                     (kind.turned(seen, np.exp(1j * angles)), robot.turned(seen, angles)))
     return bool(np.allclose(np.angle(kind.heading(seen)), robot.heading(seen)) and np.allclose(ours, theirs)

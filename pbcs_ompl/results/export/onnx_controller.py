@@ -317,7 +317,7 @@ def _leading(graph: Graph, data: ControllerData, seen: str, far: str, before: st
 
 
 def _heading(graph: Graph, data: ControllerData, seen: str) -> tuple[str, str]:
-    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.FreeJoint`."""
+    """Return cosine and sine [B, 1] of where a robot looks; see `deploy.RobotFrame`."""
     if data.words["angle"] >= 0:
         angle = graph.columns(seen, [data.words["angle"]])
         return graph("Cos", angle), graph("Sin", angle)
@@ -344,7 +344,7 @@ def _rotated(graph: Graph, x: str, y: str, c: str, s: str) -> tuple[str, str]:
 
 
 def _turned(graph: Graph, data: ControllerData, seen: str, kept: Any, c: str, s: str) -> list[str]:
-    """Return some entries of observations in a turned world, each [B, 1]; see `deploy.FreeJoint.turned`."""
+    """Return some entries of observations in a turned world, each [B, 1]; see `deploy.RobotFrame.turned`."""
     speeds = data.words["speeds"]
     if not speeds:
         return [graph.columns(seen, kept)]

@@ -6,9 +6,8 @@ from pbcs_ompl.bridge.plan import plan
 from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.interfaces import ResettableModel
 from pbcs_ompl.core.robot import Robot
-from pbcs_ompl.core.tree import Tree
-from pbcs_ompl.core.types import Array
 from pbcs_ompl.skills.path_following.line import Line
+from pbcs_ompl.skills.robots.lines import SHORTEST, long_lines
 from pbcs_ompl.skills.robots.places import line_through, places_of
 
 TRANSITIONS = 20_000
@@ -31,21 +30,10 @@ def random_branches(model: ResettableModel, robot: Robot, count: int, rng: np.ra
         InvalidState: hardly any branch is long enough.
     """
     tree = plan(model, "Rides", seed=int(rng.integers(2**31)), max_transitions=TRANSITIONS).tree
-    places, lines = places_of(robot, model.observe(tree.states)), list[Line]()
-    for node in rng.integers(0, len(tree), 20 * count).tolist():
-        line = line_through(robot, _branch(tree, places, node), spacing)
-        if line.length > 0.2 * longest:
-            kept = int(longest / line.spacing) + 1
-            lines.append(Line(line.points[:kept], line.spacing, periods=line.periods))
-        if len(lines) == count:
-            return lines
-    raise InvalidState(f"only {len(lines)} of {count} random branches are at least {0.2 * longest:g} long; choose "
-                       "shorter ones, or worlds whose goals are farther away")
-
-
-def _branch(tree: Tree, places: Array, node: int) -> Array:
-    """Return the places [N, F] of the nodes from the root to one of them."""
-    nodes = [node]
-    while tree.parents[nodes[-1]] >= 0:
-        nodes.append(int(tree.parents[nodes[-1]]))
-    return places[nodes[::-1]]
+    places = places_of(robot, model.observe(tree.states))
+    branches = (tree.path_to(node) for node in rng.integers(0, len(tree), 20 * count))
+    lines = long_lines((line_through(robot, places[nodes], spacing) for nodes in branches), count, longest)
+    if len(lines) < count:
+        raise InvalidState(f"only {len(lines)} of {count} random branches are at least {SHORTEST * longest:g} long; "
+                           "choose shorter ones, or worlds whose goals are farther away")
+    return lines

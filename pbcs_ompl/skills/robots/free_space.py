@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 from pbcs_ompl.core.errors import InvalidState
 from pbcs_ompl.core.types import Array, BoolArray, IndexArray
 from pbcs_ompl.skills.path_following.line import Line, erase_loops
+from pbcs_ompl.skills.robots.lines import SHORTEST, long_lines
 
 CELLS = 3.0
 """Grid cells in the clearance of a line."""
@@ -166,19 +167,11 @@ class FreeSpace:
         Raises:
             InvalidState: there is hardly any free space.
         """
-        lines: list[Line] = []
-        for _ in range(20 * count):
-            if len(lines) == count or not len(self.wide):
-                break
-            corners = self._random_way(rng)
-            if corners is not None:
-                line = Line.through(corners, spacing)
-                if line.length > 0.2 * longest:
-                    kept = int(longest / line.spacing) + 1
-                    lines.append(Line(line.points[:kept], line.spacing))
+        ways = (self._random_way(rng) for _ in range(20 * count if len(self.wide) else 0))
+        lines = long_lines((Line.through(way, spacing) for way in ways if way is not None), count, longest)
         if len(lines) < count:
-            raise InvalidState(f"only {len(lines)} of {count} random lines of at least {0.2 * longest:g} were found; "
-                               "choose shorter ones or a smaller clearance")
+            raise InvalidState(f"only {len(lines)} of {count} random lines of at least {SHORTEST * longest:g} were "
+                               "found; choose shorter ones or a smaller clearance")
         return lines
 
     def _random_way(self, rng: np.random.Generator) -> Array | None:

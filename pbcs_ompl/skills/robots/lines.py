@@ -1,13 +1,33 @@
 """Many lines side by side: each execution of a batch follows one of them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from pbcs_ompl.core.types import Array, IndexArray
 from pbcs_ompl.skills.path_following.line import Line, whole_periods
+
+SHORTEST = 0.2
+"""Length of the shortest random line, in those of the longest (ours)."""
+
+
+def long_lines(drawn: Iterable[Line], count: int, longest: float) -> list[Line]:
+    """Return the first lines of some that are long enough, cut at the longest length; no more are drawn than needed.
+
+    Args:
+        drawn: Random lines.
+        count: How many to return; fewer where fewer are long enough.
+        longest: Where a line ends at the latest, a length.
+    """
+    found: list[Line] = []
+    for line in drawn:
+        if line.length > SHORTEST * longest:
+            found.append(replace(line, points=line.points[:int(longest / line.spacing) + 1]))
+        if len(found) == count:
+            break
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +81,11 @@ class Lines:
         if self.periods is None:
             return features
         return features - whole_periods(features - self.at(pointers), self.periods)
+
+    def away(self, features: Array, pointers: IndexArray) -> Array:
+        """Return the distances [B] of executions at features [B, F] from the points of pointers [B]."""
+        distances: Array = np.linalg.norm(self.unwound(features, pointers) - self.at(pointers), axis=1)
+        return distances
 
     def advance(self, features: Array, pointers: IndexArray, window: float) -> IndexArray:
         """Return the pointers [B] moved forward; see `Line.advance`.

@@ -165,17 +165,14 @@ class RobotTraining:
 
     def _reached(self, lines: Any, places: Array, pointers: IndexArray) -> BoolArray:
         radius = self.settings.lines.goal_radius
-        near = np.linalg.norm(lines.ahead(places, lines.last, np.zeros(1))[:, 0], axis=1) < radius
+        near = lines.away(places, lines.last) < radius
         reached: BoolArray = near & ((lines.last - pointers) * lines.spacing <= 2.0 * radius)
         return reached
 
     def _strayed(self) -> Array:
         """Return the distances [B] of the walks from their pointers, lengths."""
-        walks = self.walks
-        lines = self.worlds.lines[walks.rows]
-        away: Array = np.linalg.norm(lines.ahead(self.view.places(walks.observations), walks.progress.pointers,
-                                                 np.zeros(1))[:, 0], axis=1)
-        return away
+        places, lines = self.view.places(self.walks.observations), self.worlds.lines[self.walks.rows]
+        return lines.away(places, self.walks.progress.pointers)
 
     def _mark(self, gains: Array, reached: BoolArray) -> None:
         """Keep states from which an episode has advanced, and mark new ones."""
